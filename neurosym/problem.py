@@ -1,0 +1,99 @@
+"""What a planner sees of a problem: actions, states, and an oracle that answers attempts.
+
+A planner never sees geometry, pictures or networks. `SearchProblem` is all it may use, so a planner
+can be tested on a number line, and an oracle can be exchanged (grounded geometry, a simulation) without
+the planner knowing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
+
+if TYPE_CHECKING:
+    from neurosym.language.terms import Atom
+
+S = TypeVar("S", bound=Hashable)
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """The answer of a predicate, with its evidence. Truthy exactly when it holds.
+
+    Attributes:
+        holds: the answer.
+        because: names of the objects that decided it.
+        reason: one sentence for a person.
+        until: a promise, for a verdict that does not hold: it will not hold in any later state
+            until one of these ground atoms changes. `None` promises nothing; an empty tuple promises
+            that it never will. Planners learn from it, so it must be sound.
+        how: for a verdict that holds, how the action may be done (a direction, a path), kept in the plan.
+    """
+
+    holds: bool
+    because: tuple[str, ...] = ()
+    reason: str = ""
+    until: tuple[Atom, ...] | None = None
+    how: Any = None
+
+    def __bool__(self) -> bool:
+        return self.holds
+
+
+@dataclass(frozen=True, slots=True)
+class Step(Generic[S]):
+    """An attempt that succeeded: the new state, and how it was done (direction, path, what was held)."""
+
+    state: S
+    how: Any = None
+
+
+@dataclass(frozen=True, slots=True)
+class Rejection:
+    """An attempt that was refused, and why.
+
+    Attributes:
+        reason: one sentence for a person.
+        because: names of the objects that decided it.
+        until: indices of actions. A promise: the action stays refused in every state reached from this
+            one until one of these is done. Empty promises nothing. An action that can never succeed
+            names itself. Planners prune by it, so it must be sound.
+    """
+
+    reason: str
+    because: tuple[str, ...] = ()
+    until: tuple[int, ...] = ()
+
+
+class SearchProblem(Protocol[S]):
+    """All that a planner may use.
+
+    Attributes:
+        actions: names of the N action primitives, in the order in which priors score them. Each can be
+            used once in a plan; the planner, not the state, remembers which were used.
+        classes: one integer an action; actions of one class are interchangeable: swapping two of them
+            leaves the whole problem as it was.
+        initial: the state to start from (hashable and small).
+    """
+
+    @property
+    def actions(self) -> Sequence[str]: ...
+
+    @property
+    def classes(self) -> Sequence[int]: ...
+
+    @property
+    def initial(self) -> S: ...
+
+    def is_goal(self, state: S) -> bool:
+        """Whether the task is done in `state`."""
+        ...
+
+    def candidates(self, state: S) -> Iterable[int]:
+        """Indices of the actions that are symbolically applicable in `state`: cheap, asks no oracle."""
+        ...
+
+    def attempt(self, state: S, action: int) -> Step[S] | Rejection:
+        """Ask the oracle whether a candidate `action` may be done in `state`: costly, counted."""
+        ...

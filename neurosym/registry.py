@@ -1,0 +1,87 @@
+"""Domains, planners and priors by name, through entry points: ours are declared as a third party's would be.
+
+Wherever a name is taken, an object is too.
+"""
+
+from __future__ import annotations
+
+import inspect
+from functools import cache
+from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
+from typing import Any
+
+from neurosym.errors import ContractError, InputError, UnknownNameError
+from neurosym.family import ProblemFamily
+from neurosym.planner import Planner
+from neurosym.prior import Prior
+
+DOMAINS, PLANNERS, PRIORS = "neurosym.domains", "neurosym.planners", "neurosym.priors"
+_REINSTALL = "A new entry point shows only after the package that declares it is installed again."
+
+
+@cache
+def _entry_points(group: str) -> dict[str, EntryPoint]:
+    return {e.name: e for e in entry_points(group=group)}
+
+
+def domain_names() -> list[str]:
+    """Names that `load_domain` takes."""
+    return sorted(_entry_points(DOMAINS))
+
+
+def planner_names() -> list[str]:
+    """Names that `load_planner` takes."""
+    return sorted(_entry_points(PLANNERS))
+
+
+def prior_names() -> list[str]:
+    """Names that `load_prior` takes (it takes the path of a weights file, too)."""
+    return sorted(_entry_points(PRIORS))
+
+
+def load_domain(domain: str | ProblemFamily, **options: Any) -> ProblemFamily:
+    """The problem family of that name, for instance ``"soma"``; a family is passed through."""
+    if isinstance(domain, ProblemFamily):
+        return domain
+    return _make(DOMAINS, "domain", domain, ProblemFamily, options)
+
+
+def load_planner(planner: str | Planner, **options: Any) -> Planner:
+    """The planner of that name, for instance ``"best-first"``; a planner is passed through."""
+    if isinstance(planner, Planner):
+        return planner
+    return _make(PLANNERS, "planner", planner, Planner, options)
+
+
+def load_prior(prior: str | Path | Prior, **options: Any) -> Prior:
+    """The prior of that name, or the one whose weights a ``.safetensors`` file holds; a prior is passed through.
+
+    A weights file names in its header the entry point that can read it, so any registered prior that can be
+    saved can be loaded from its file.
+    """
+    if isinstance(prior, Prior):
+        return prior
+    if str(prior).endswith(".safetensors"):
+        from neurosym.weights_header import read_header
+
+        header = read_header(Path(prior))
+        return _make(PRIORS, "prior", header.get("prior"), Prior, {"weights": Path(prior), **options})
+    return _make(PRIORS, "prior", str(prior), Prior, options, hint="A weights file ends in .safetensors.")
+
+
+def _make(group: str, kind: str, name: object, base: type, options: dict[str, Any], hint: str = "") -> Any:
+    known = _entry_points(group)
+    if not isinstance(name, str) or name not in known:
+        raise UnknownNameError(kind, name, known, hint=f"{hint} {_REINSTALL}".strip())
+    factory = known[name].load()
+    try:
+        inspect.signature(factory).bind(**options)
+    except TypeError as error:
+        raise InputError(f"Expected options that the {kind} {name!r} takes; got {options}: {error}.") from None
+    made = factory(**options)
+    if not isinstance(made, base):
+        raise ContractError(
+            f"Expected the entry point {name!r} of {group} to give a {base.__name__}; got {type(made).__name__}."
+        )
+    return made
