@@ -1,1 +1,23 @@
+"""The symbolic language: types, objects, fluents, derived predicates, actions, domains and problems."""
 
+from neurosym.language.actions import Action
+from neurosym.language.domain import Domain, Problem, Simulation
+from neurosym.language.grounding import GroundProblem
+from neurosym.language.state import State
+from neurosym.language.terms import Atom, Derived, Fluent, Literal, Type, Variable, derived
+
+__all__ = [
+    "Action",
+    "Atom",
+    "Derived",
+    "Domain",
+    "Fluent",
+    "GroundProblem",
+    "Literal",
+    "Problem",
+    "Simulation",
+    "State",
+    "Type",
+    "Variable",
+    "derived",
+]

@@ -1,0 +1,363 @@
+"""Assemblies: named rigid parts at poses, each a union of boxes, convex bodies or closed meshes.
+
+Frames are named as Drake does: ``X_WP`` is the pose of part P in the world W, a 4 x 4 rigid motion;
+``X_PB`` that of body B in part P. z points up; lengths are in the user's unit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from neurosym.errors import AssemblyError, UnknownNameError
+from neurosym.geometry.tolerances import DEFAULT_TOLERANCES, Tolerances
+
+if TYPE_CHECKING:
+    from neurosym.geometry.blocking import BlockingGraph
+    from neurosym.geometry.contacts import Contact
+    from neurosym.geometry.stability import Stability
+
+Array = NDArray[np.float64]
+
+#: Corners of a unit box about the origin, and its twelve triangles with outward normals.
+_CORNERS = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
+_BOX_FACES = np.array(
+    [
+        [0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1],
+        [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3],
+    ]
+)  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Box:
+    """A box about its frame's origin. ``size``: float64 (3,), full edge lengths."""
+
+    size: Array
+
+    @property
+    def vertices(self) -> Array:
+        return _CORNERS * self.size
+
+    @property
+    def faces(self) -> NDArray[np.int64]:
+        return _BOX_FACES
+
+
+@dataclass(frozen=True, eq=False)
+class Convex:
+    """A convex body. ``vertices``: float64 (n, 3); ``faces``: int64 (m, 3), outward."""
+
+    vertices: Array
+    faces: NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """A closed triangle mesh, convex or not. ``vertices``: float64 (n, 3); ``faces``: int64 (m, 3), outward."""
+
+    vertices: Array
+    faces: NDArray[np.int64]
+
+
+Shape = Box | Convex | Mesh
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """One shape of a part. ``X_PB``: float64 (4, 4), its pose in the part's frame."""
+
+    shape: Shape
+    X_PB: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """A rigid part: bodies that move together. ``X_WP``: float64 (4, 4); ``density``: mass per unit of volume."""
+
+    name: str
+    bodies: tuple[Body, ...]
+    X_WP: Array
+    density: float = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Assembly:
+    """Named parts at poses.
+
+    Attributes:
+        parts: the parts, each with a name of its own.
+        table: height of the table's plane (z, world), or None: under the lowest point.
+        friction: Coulomb's coefficient between any two faces (no unit).
+        tolerances: how exact the geometry is taken to be.
+    """
+
+    parts: tuple[Part, ...]
+    table: float | None = None
+    friction: float = 0.5
+    tolerances: Tolerances = DEFAULT_TOLERANCES
+    _cache: dict[str, Any] = field(default_factory=dict, repr=False)
+    _keep_answers: bool = field(default=True, repr=False)
+
+    def __post_init__(self) -> None:
+        names = [p.name for p in self.parts]
+        if not names:
+            raise AssemblyError("Expected at least one part; got none.")
+        twice = sorted({n for n in names if names.count(n) > 1})
+        if twice:
+            raise AssemblyError(f"Expected each part name once; got twice: {', '.join(twice)}. Rename one.")
+        for part in self.parts:
+            if not part.bodies:
+                raise AssemblyError(f"Expected part {part.name!r} to have at least one body; it is empty.")
+            for body in part.bodies:
+                X = part.X_WP @ body.X_PB
+                if not np.isfinite(body.shape.vertices).all() or not np.isfinite(X).all():
+                    raise AssemblyError(f"Expected finite coordinates; part {part.name!r} has NaN or infinity.")
+
+    # -- making -----------------------------------------------------------------------------------------------
+
+    @classmethod
+    def from_cells(
+        cls,
+        cells: Mapping[str, Iterable[Sequence[int]]],
+        size: float = 1.0,
+        *,
+        table: float | None = None,
+        friction: float = 0.5,
+        tolerances: Tolerances = DEFAULT_TOLERANCES,
+    ) -> Assembly:
+        """Parts made of unit cells, each cell a box of edge `size`; cell (x, y, z) spans size * (x .. x + 1).
+
+        Raises:
+            AssemblyError: an empty part, a cell that comes twice or belongs to two parts, or that is no triple
+                of integers.
+        """
+        if not np.isfinite(size) or size <= 0:
+            raise AssemblyError(f"Expected a cell size above 0; got {size!r}.")
+        owner: dict[tuple[int, int, int], str] = {}
+        parts = []
+        for name, given in cells.items():
+            triples = [_cell(name, c) for c in given]
+            if not triples:
+                raise AssemblyError(f"Expected part {name!r} to have at least one cell; it is empty.")
+            for cell in triples:
+                if cell in owner:
+                    other = owner[cell]
+                    said = "comes twice" if other == name else f"belongs to {other!r} too: the parts overlap"
+                    raise AssemblyError(f"Part {name!r}: the cell {cell} {said}. Give each cell to one part, once.")
+                owner[cell] = name
+            parts.append(boxes_part(name, (np.array(triples) + 0.5) * size, np.full(3, size)))
+        return cls(tuple(parts), table, friction, tolerances)
+
+    @classmethod
+    def from_meshes(
+        cls,
+        meshes: Mapping[str, Any],
+        *,
+        table: float | None = None,
+        friction: float = 0.5,
+        tolerances: Tolerances = DEFAULT_TOLERANCES,
+    ) -> Assembly:
+        """Parts given as closed meshes in their assembled poses.
+
+        Args:
+            meshes: name -> a `trimesh.Trimesh`, or anything with ``vertices`` (n, 3) and ``faces`` (m, 3), or a
+                pair of such arrays. A part all of whose faces lie on one cubic grid (in any pose) becomes boxes.
+        """
+        from neurosym.geometry.meshes import parts_from_meshes
+
+        return cls(parts_from_meshes(meshes, tolerances), table, friction, tolerances)
+
+    def transformed(self, X: ArrayLike) -> Assembly:
+        """The assembly moved by a rigid motion of the world, float64 (4, 4).
+
+        A table that was given goes along with an upright motion; one under the lowest point stays there.
+        """
+        motion = _rigid(X)
+        parts = tuple(Part(p.name, p.bodies, motion @ p.X_WP, p.density) for p in self.parts)
+        table = self.table
+        if table is not None:
+            if not np.isclose(motion[2, 2], 1.0):
+                raise AssemblyError("Expected an upright motion: the table of this assembly was given by its height.")
+            table = float(table + motion[2, 3])
+        return Assembly(parts, table, self.friction, self.tolerances)
+
+    def afresh(self) -> Assembly:
+        """The same assembly with nothing remembered and nothing tabulated: every question is asked anew."""
+        return Assembly(self.parts, self.table, self.friction, self.tolerances, {}, False)
+
+    # -- asking -----------------------------------------------------------------------------------------------
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Names of the parts, in order; masks of parts number their bits so."""
+        return tuple(p.name for p in self.parts)
+
+    @cached_property
+    def index(self) -> dict[str, int]:
+        """Name of a part -> its number."""
+        return {name: i for i, name in enumerate(self.names)}
+
+    def __len__(self) -> int:
+        return len(self.parts)
+
+    def __getitem__(self, name: str) -> Part:
+        try:
+            return self.parts[self.index[name]]
+        except KeyError:
+            raise UnknownNameError("part", name, self.names) from None
+
+    @property
+    def keeps_answers(self) -> bool:
+        """Whether pairwise answers are tabulated; a copy made by `afresh` asks each question anew."""
+        return self._keep_answers
+
+    @cached_property
+    def bodies(self) -> tuple[Body, ...]:
+        """All bodies, part by part; masks of bodies number their bits so."""
+        return tuple(b for p in self.parts for b in p.bodies)
+
+    @cached_property
+    def owners(self) -> NDArray[np.int64]:
+        """int64 (n_bodies,): the number of the part that each body belongs to."""
+        return np.repeat(np.arange(len(self.parts)), [len(p.bodies) for p in self.parts])
+
+    @cached_property
+    def X_WB(self) -> Array:
+        """float64 (n_bodies, 4, 4): poses of all bodies in the world."""
+        return np.array([p.X_WP @ b.X_PB for p in self.parts for b in p.bodies])
+
+    @cached_property
+    def all_boxes(self) -> bool:
+        """Whether every body is a box."""
+        return all(isinstance(b.shape, Box) for b in self.bodies)
+
+    def body_vertices(self, body: int) -> Array:
+        """float64 (n, 3): the vertices of a body, in the world."""
+        X = self.X_WB[body]
+        vertices: Array = self.bodies[body].shape.vertices @ X[:3, :3].T + X[:3, 3]
+        return vertices
+
+    @cached_property
+    def body_bounds(self) -> Array:
+        """float64 (n_bodies, 2, 3): axis-aligned bounds of the bodies, in the world."""
+        found = []
+        for i in range(len(self.bodies)):
+            vertices = self.body_vertices(i)
+            found.append((vertices.min(axis=0), vertices.max(axis=0)))
+        return np.array(found)
+
+    @cached_property
+    def bounds(self) -> Array:
+        """float64 (2, 3): axis-aligned bounds of the whole, in the world."""
+        return np.array([self.body_bounds[:, 0].min(axis=0), self.body_bounds[:, 1].max(axis=0)])
+
+    @property
+    def ground(self) -> float:
+        """Height of the table (z, world): as given, else the lowest point."""
+        return float(self.bounds[0, 2]) if self.table is None else self.table
+
+    @cached_property
+    def smallest_extent(self) -> float:
+        """The smallest extent of any body in its own frame: what tolerances are shares of."""
+        return float(min(np.ptp(b.shape.vertices, axis=0).min() for b in self.bodies))
+
+    @cached_property
+    def touch(self) -> float:
+        """The touching tolerance as a length."""
+        return self.tolerances.touch * self.smallest_extent
+
+    @cached_property
+    def axes(self) -> Array:
+        """float64 (k, 3): the directions in which the assembly is built, both ways, the most upward first.
+
+        These are the axes of its boxes, up to sign, and the vertical; without boxes, the world's axes.
+        """
+        found = [np.array([0.0, 0.0, 1.0])]
+        rotations = [X[:3, :3].T for X, b in zip(self.X_WB, self.bodies) if isinstance(b.shape, Box)]
+        candidates = np.concatenate(rotations) if rotations else np.eye(3)
+        for axis in np.unique(np.round(candidates, 9), axis=0):
+            if all(np.linalg.norm(np.cross(axis, other)) > self.tolerances.parallel for other in found):
+                found.append(axis / np.linalg.norm(axis))
+        both = np.array([s * a for a in found for s in (1.0, -1.0)])
+        both[np.abs(both) < 1e-12] = 0.0
+        return both[np.lexsort((-both[:, 0], -both[:, 1], -both[:, 2].round(9)))]
+
+    def mask(self, names: Iterable[str]) -> int:
+        """A bitset of parts."""
+        return sum(1 << self.index[n] for n in names)
+
+    def in_mask(self, mask: int) -> tuple[str, ...]:
+        """Names of the parts in a bitset."""
+        return tuple(n for i, n in enumerate(self.names) if mask >> i & 1)
+
+    # -- facts about pairs, computed once ---------------------------------------------------------------------
+
+    def contacts(self) -> tuple[Contact, ...]:
+        """Where bodies touch one another and the table: points, normals, areas."""
+        from neurosym.geometry.contacts import find_contacts
+
+        return self._once("contacts", lambda: find_contacts(self))
+
+    def blocking(self, directions: ArrayLike | None = None) -> BlockingGraph:
+        """What stands in the way of what, per direction, float64 (k, 3); default `axes`."""
+        from neurosym.geometry.blocking import BlockingGraph
+
+        chosen = self.axes if directions is None else np.atleast_2d(np.asarray(directions, dtype=np.float64))
+        return self._once(f"blocking {chosen.tobytes().hex()}", lambda: BlockingGraph(self, chosen))
+
+    def stability(self) -> Stability:
+        """Which subsets of the parts stand still under gravity."""
+        from neurosym.geometry.stability import Stability
+
+        return self._once("stability", lambda: Stability(self))
+
+    def _once(self, key: str, make: Any) -> Any:
+        if key not in self._cache:
+            self._cache[key] = make()
+        return self._cache[key]
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Copies sent to other processes leave the remembered answers behind: FCL's objects cannot travel."""
+        state = {k: v for k, v in self.__dict__.items() if k in self.__dataclass_fields__}
+        state["_cache"] = {}
+        return state
+
+
+def boxes_part(name: str, centres: Array, size: Array, X_WP: Array | None = None, density: float = 1.0) -> Part:
+    """A part of equal boxes: ``centres`` float64 (n, 3) in its frame, ``size`` float64 (3,)."""
+    bodies = []
+    for centre in centres:
+        X = np.eye(4)
+        X[:3, 3] = centre
+        bodies.append(Body(Box(size), X))
+    return Part(name, tuple(bodies), np.eye(4) if X_WP is None else X_WP, density)
+
+
+def _cell(name: str, cell: Sequence[int]) -> tuple[int, int, int]:
+    try:
+        array = np.asarray(cell)
+        whole = array.shape == (3,) and bool(np.all(np.equal(np.mod(array, 1), 0)))
+    except (TypeError, ValueError):
+        whole = False
+    if not whole:
+        raise AssemblyError(f"Part {name!r}: expected cells (x, y, z) of three integers; got {cell!r}.")
+    x, y, z = (int(v) for v in array)
+    return x, y, z
+
+
+def _rigid(X: ArrayLike) -> Array:
+    motion = np.asarray(X, dtype=np.float64)
+    if motion.shape != (4, 4) or not np.isfinite(motion).all():
+        raise AssemblyError(f"Expected a rigid motion of shape (4, 4); got shape {motion.shape}.")
+    R = motion[:3, :3]
+    if not np.allclose(R @ R.T, np.eye(3), atol=1e-6) or np.linalg.det(R) < 0:
+        raise AssemblyError("Expected a rigid motion: a rotation without scale or reflection; this is none.")
+    if not np.allclose(motion[3], [0, 0, 0, 1]):
+        raise AssemblyError(f"Expected the last row of a rigid motion to be 0 0 0 1; got {motion[3]}.")
+    return motion

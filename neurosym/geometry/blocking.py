@@ -1,0 +1,151 @@
+"""The blocking graph: per direction, which parts stand in the way of which.
+
+A directional blocking graph (Wilson and Latombe, "Geometric reasoning about mechanical assembly", 1994) says
+for one direction of translation to infinity which parts a part would hit. It is computed once, pair by pair
+and body by body; every later question about a subset of the parts is bit arithmetic.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import networkx as nx
+import numpy as np
+from numpy.typing import NDArray
+
+from neurosym.errors import InputError
+from neurosym.geometry import collision
+from neurosym.geometry.assembly import Box
+from neurosym.geometry.contacts import plane_axes
+from neurosym.geometry.sweep import swept_box_hits, triangles_block
+
+if TYPE_CHECKING:
+    from neurosym.geometry.assembly import Assembly
+
+Array = NDArray[np.float64]
+
+
+class BlockingGraph:
+    """Blocking of an assembly in k directions.
+
+    Attributes:
+        directions: float64 (k, 3), unit vectors.
+        by_body: by_body[d][i] is a bitset of the bodies that body i hits when it moves along direction d.
+        by_part: the same for parts: what any body of the part hits, the part itself left out.
+        into_table: bool (k,): whether a motion along the direction would run into the table.
+        queries: pairs of bodies put to the exact test, after the filter by swept bounds.
+    """
+
+    def __init__(self, assembly: Assembly, directions: Array) -> None:
+        lengths = np.linalg.norm(directions, axis=1)
+        if directions.ndim != 2 or directions.shape[1] != 3 or not np.isfinite(lengths).all() or not lengths.all():
+            raise InputError(f"Expected directions as non-zero vectors of shape (k, 3); got {directions.tolist()}.")
+        self.assembly = assembly
+        self.directions = directions / lengths[:, None]
+        self.names = assembly.names
+        self.into_table = self.directions[:, 2] < -assembly.tolerances.parallel
+        self.queries = 0
+        self.by_body = [self._bodies_along(d) for d in self.directions]
+        owner_bits = [1 << int(o) for o in assembly.owners]
+        self.by_part = []
+        for along in self.by_body:
+            parts = [0] * len(assembly)
+            for body, blockers in enumerate(along):
+                owner = int(assembly.owners[body])
+                for other in bits(blockers):
+                    parts[owner] |= owner_bits[other]
+            self.by_part.append([mask & ~(1 << i) for i, mask in enumerate(parts)])
+
+    def blockers(self, part: int, direction: int, among: int) -> int:
+        """Bitset of those parts in `among` that part number `part` would hit along direction number `direction`."""
+        return self.by_part[direction][part] & among & ~(1 << part)
+
+    def group_blockers(self, group: int, direction: int, among: int) -> int:
+        """The same for a group of parts (a bitset) that leaves together."""
+        hit = 0
+        for part in bits(group):
+            hit |= self.by_part[direction][part]
+        return hit & among & ~group
+
+    def free_directions(self, part: int, among: int, *, table: bool = True) -> list[int]:
+        """Numbers of the directions along which a part can leave the parts in `among` (and the table)."""
+        return [
+            d
+            for d in range(len(self.directions))
+            if not (table and self.into_table[d]) and not self.blockers(part, d, among)
+        ]
+
+    def graph(self, direction: int, among: int | None = None) -> nx.DiGraph:
+        """The graph of one direction: an edge from a part to each part that it would hit.
+
+        A part without outgoing edges is free in this direction; the parts of a strongly connected component
+        can leave only together.
+        """
+        among = (1 << len(self.names)) - 1 if among is None else among
+        graph = nx.DiGraph(direction=tuple(map(float, self.directions[direction])))
+        for i in bits(among):
+            graph.add_node(self.names[i])
+        for i in bits(among):
+            graph.add_edges_from((self.names[i], self.names[j]) for j in bits(self.blockers(i, direction, among)))
+        return graph
+
+    def describe(self, direction: int) -> str:
+        """A direction in words: ``+z``, or its three numbers."""
+        vector = self.directions[direction]
+        for axis, name in enumerate("xyz"):
+            if abs(abs(vector[axis]) - 1) < 1e-9:
+                return ("+" if vector[axis] > 0 else "-") + name
+        return "(" + ", ".join(f"{v + 0.0:.3g}" for v in vector) + ")"
+
+    def _bodies_along(self, direction: Array) -> list[int]:
+        """One direction: candidate pairs by swept bounds, whole at once, then the exact test on what is left."""
+        assembly = self.assembly
+        low, high = self._bounds_along(direction)
+        margin = assembly.touch
+        across = (low[:, None, :2] + margin < high[None, :, :2]) & (high[:, None, :2] - margin > low[None, :, :2])
+        ahead = high[None, :, 2] > low[:, None, 2] + margin
+        pairs = across.all(axis=2) & ahead & (assembly.owners[:, None] != assembly.owners[None])
+        shapes = [b.shape for b in assembly.bodies]
+        reach = float(high[:, 2].max() - low[:, 2].min()) + assembly.smallest_extent
+        found = [0] * len(shapes)
+        objects: dict[int, object] = {}
+        for i in range(len(shapes)):
+            others = np.flatnonzero(pairs[i])
+            if not len(others):
+                continue
+            self.queries += len(others)
+            box_others = [int(j) for j in others if isinstance(shapes[j], Box)]
+            if isinstance(shapes[i], Box) and box_others:
+                for j in box_others:
+                    if j not in objects:
+                        objects[j] = collision.box_object(shapes[j].size, assembly.X_WB[j])  # type: ignore[union-attr]
+                hits = swept_box_hits(
+                    assembly, i, direction, reach, [objects[j] for j in box_others], box_others
+                )
+                others = np.setdiff1d(others, box_others)
+            else:
+                hits = []
+            hits += [int(j) for j in others if triangles_block(assembly, i, int(j), direction)]
+            found[i] = sum(1 << j for j in hits)
+        return found
+
+    def _bounds_along(self, direction: Array) -> tuple[Array, Array]:
+        """Bounds (n, 3) of all bodies in a frame whose last axis is the direction, along the others if it can be."""
+        u, v = plane_axes(direction)
+        for other in self.directions:
+            if abs(other @ direction) < 1e-9:
+                u, v = other, np.cross(direction, other)
+                break
+        frame = np.stack([u, v, direction], axis=1)
+        corners = [self.assembly.body_vertices(i) @ frame for i in range(len(self.assembly.bodies))]
+        return np.array([c.min(axis=0) for c in corners]), np.array([c.max(axis=0) for c in corners])
+
+
+def bits(mask: int) -> list[int]:
+    """Numbers of the bits that are set."""
+    found = []
+    while mask:
+        low = mask & -mask
+        found.append(low.bit_length() - 1)
+        mask ^= low
+    return found

@@ -1,0 +1,276 @@
+"""Grounding: a problem as bitsets. A state is one Python int, a bit a ground fluent, whatever the size."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+from neurosym.errors import ContractError, DefinitionError
+from neurosym.language.domain import check_precedence
+from neurosym.language.terms import Atom, Derived, Fluent, Literal
+from neurosym.problem import Rejection, Step, Verdict
+
+if TYPE_CHECKING:
+    from neurosym.language.domain import Problem
+
+
+class _Instance:
+    """A ground action before it has bits."""
+
+    def __init__(self, name: str, pre: Sequence[Literal], eff: Sequence[Literal]) -> None:
+        self.name = name
+        self.fluents = [p for p in pre if not isinstance(p.atom.predicate, Derived)]
+        self.derived = [p for p in pre if isinstance(p.atom.predicate, Derived)]
+        self.eff = eff
+
+
+class GroundProblem:
+    """A grounded problem: the `SearchProblem` that planners are given.
+
+    Actions that no state can reach (delete relaxation, derived predicates taken as possible) are no action
+    primitives: in a problem that starts half done, those already done are gone.
+    """
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+        self.world = problem.world
+        instances, all_names = self._instances()
+        reachable = _reachable(set(problem.init), instances)
+        self.actions: tuple[str, ...] = tuple(i.name for i in reachable)
+        self._check_goal(reachable)
+        check_precedence(problem.before, all_names, f"problem {problem.name!r}")
+
+        index = {name: i for i, name in enumerate(self.actions)}
+        # A predecessor that can no longer be done was done before the problem began.
+        precedence = [(index[a], index[b]) for a, b in problem.before if a in index and b in index]
+        self._bits = self._number(reachable)
+        done = {a: len(self._bits) + k for k, a in enumerate(sorted({a for a, _ in precedence}))}
+
+        self._pos, self._neg, self._add, self._del = [], [], [], []
+        self._derived: list[list[tuple[Derived, tuple[str, ...], bool]]] = []
+        for i, instance in enumerate(reachable):
+            pos = self._mask(p.atom for p in instance.fluents if p.positive)
+            self._pos.append(pos | sum(1 << done[a] for a, b in set(precedence) if b == i))
+            self._neg.append(self._mask(p.atom for p in instance.fluents if not p.positive))
+            add = self._mask(e.atom for e in instance.eff if e.positive)
+            self._add.append(add | (1 << done[i] if i in done else 0))
+            self._del.append(self._mask(e.atom for e in instance.eff if not e.positive))
+            self._derived.append(
+                [(d.atom.predicate, d.atom.args, d.positive) for d in instance.derived]  # type: ignore[misc]
+            )
+        self.initial: int = self._mask(problem.init)
+        self._goal_pos = self._mask(g.atom for g in self._fluent_goals if g.positive)
+        self._goal_neg = self._mask(g.atom for g in self._fluent_goals if not g.positive)
+        self._done_bits = done
+        self.classes: tuple[int, ...] = self._classes({a for pair in precedence for a in pair})
+        self._touching: dict[Atom, tuple[int, ...]] = {}
+        for i, instance in enumerate(reachable):
+            for effect in instance.eff:
+                self._touching[effect.atom] = (*self._touching.get(effect.atom, ()), i)
+
+    # -- what planners use ------------------------------------------------------------------------------------
+
+    def is_goal(self, state: int) -> bool:
+        """Whether the goal holds; its derived predicates are asked only once the fluents do."""
+        if (state & self._goal_pos) != self._goal_pos or state & self._goal_neg:
+            return False
+        view = BitState(self, state)
+        return all(
+            _ask(g.atom.predicate, self.world, view, g.atom.args).holds is g.positive  # type: ignore[arg-type]
+            for g in self._derived_goals
+        )
+
+    def candidates(self, state: int) -> list[int]:
+        """Indices of the actions whose fluents allow them in `state`."""
+        return [
+            i
+            for i, (pos, neg) in enumerate(zip(self._pos, self._neg))
+            if (state & pos) == pos and not state & neg
+        ]
+
+    def attempt(self, state: int, action: int) -> Step[int] | Rejection:
+        """Ask the derived predicates of `action`, in their order; the first refusal is the answer."""
+        if (state & self._pos[action]) != self._pos[action] or state & self._neg[action]:
+            return self._not_applicable(state, action)
+        how = None
+        view = BitState(self, state)
+        for predicate, args, positive in self._derived[action]:
+            verdict = _ask(predicate, self.world, view, args)
+            if verdict.holds is not positive:
+                return self._rejection(action, predicate, args, positive, verdict)
+            if how is None:
+                how = verdict.how
+        return Step(self.apply(state, action), how)
+
+    def apply(self, state: int, action: int) -> int:
+        """The state after the effects of `action`, no question asked."""
+        return (state & ~self._del[action]) | self._add[action]
+
+    # -- for people and oracles -------------------------------------------------------------------------------
+
+    def atoms(self, state: int) -> tuple[Atom, ...]:
+        """The fluents that hold in `state`."""
+        return tuple(atom for atom, bit in self._bits.items() if state >> bit & 1)
+
+    def _not_applicable(self, state: int, action: int) -> Rejection:
+        missing = [str(a) for a, bit in self._bits.items() if self._pos[action] >> bit & 1 and not state >> bit & 1]
+        missing += [f"not {a}" for a, bit in self._bits.items() if self._neg[action] & state & (1 << bit)]
+        for predecessor, bit in self._done_bits.items():
+            if self._pos[action] >> bit & 1 and not state >> bit & 1:
+                missing.append(f"{self.actions[predecessor]} to be done before")
+        return Rejection(f"{self.actions[action]} is not applicable: it needs {', '.join(missing)}.")
+
+    def _rejection(
+        self, action: int, predicate: Derived, args: tuple[str, ...], positive: bool, verdict: Verdict
+    ) -> Rejection:
+        said = verdict.reason or f"{predicate}({', '.join(args)}) {'does not hold' if positive else 'holds'}."
+        # A promise speaks of a verdict that stays false; it says nothing of one that must become false.
+        if not positive or verdict.until is None:
+            return Rejection(said, verdict.because, ())
+        until = {a for atom in verdict.until for a in self._touching.get(atom, ())}
+        return Rejection(said, verdict.because, tuple(sorted(until)) or (action,))
+
+    # -- construction -----------------------------------------------------------------------------------------
+
+    def _instances(self) -> tuple[list[_Instance], list[str]]:
+        problem = self.problem
+        changed = {e.atom.predicate for a in problem.domain.actions for e in a.eff}
+        initial = set(problem.init)
+        instances, seen = [], {}
+        for action in problem.domain.actions:
+            for binding in problem.bindings(action):
+                name = action.ground_name(binding)
+                if name in seen:
+                    raise DefinitionError(
+                        f"In problem {problem.name!r}: two ground actions are called {name!r} "
+                        f"({seen[name]} and {action.name} {binding}); give the action a label over all its parameters."
+                    )
+                seen[name] = f"{action.name} {binding}"
+                pre = [p.bind(binding) for p in action.pre]
+                static = [p for p in pre if isinstance(p.atom.predicate, Fluent) and p.atom.predicate not in changed]
+                if all((p.atom in initial) is p.positive for p in static):
+                    pre = [p for p in pre if p not in static]
+                    instances.append(_Instance(name, pre, [e.bind(binding) for e in action.eff]))
+        return instances, list(seen)
+
+    def _check_goal(self, reachable: Sequence[_Instance]) -> None:
+        made = {e.atom for i in reachable for e in i.eff if e.positive} | set(self.problem.init)
+        unmade = {e.atom for i in reachable for e in i.eff if not e.positive}
+        for i, goal in enumerate(self.problem.goal):
+            if isinstance(goal.atom.predicate, Derived):
+                continue
+            stuck = goal.atom not in made if goal.positive else goal.atom in self.problem.init and (
+                goal.atom not in unmade
+            )
+            if stuck:
+                raise DefinitionError(
+                    f"In problem {self.problem.name!r}, goal[{i}]: no action that can be reached makes {goal} true, "
+                    "so no order can; check the effects and the initial state."
+                )
+
+    @cached_property
+    def _fluent_goals(self) -> list[Literal]:
+        return [g for g in self.problem.goal if not isinstance(g.atom.predicate, Derived)]
+
+    @cached_property
+    def _derived_goals(self) -> list[Literal]:
+        return [g for g in self.problem.goal if isinstance(g.atom.predicate, Derived)]
+
+    def _number(self, reachable: Sequence[_Instance]) -> dict[Atom, int]:
+        """Atom -> bit. Fluents of one argument take one run of bits in the order of the objects: `mask` shifts."""
+        bits: dict[Atom, int] = {}
+        self.runs: dict[Fluent, tuple[int, tuple[str, ...]]] = {}
+        for fluent in self.problem.domain.fluents:
+            if len(fluent.types) == 1:
+                names = self.problem.objects_of(fluent.types[0])
+                self.runs[fluent] = (len(bits), names)
+                for name in names:
+                    bits[Atom(fluent, (name,))] = len(bits)
+        literals = [p for i in reachable for p in (*i.fluents, *i.eff)] + self._fluent_goals
+        for atom in (*self.problem.init, *(p.atom for p in literals)):
+            bits.setdefault(atom, len(bits))
+        return bits
+
+    def _mask(self, atoms: Iterable[Atom]) -> int:
+        mask = 0
+        for atom in atoms:
+            mask |= 1 << self._bits[atom]
+        return mask
+
+    def _classes(self, constrained: set[int]) -> tuple[int, ...]:
+        place = f"In problem {self.problem.name!r}, interchangeable"
+        index = {name: i for i, name in enumerate(self.actions)}
+        classes = list(range(len(self.actions)))
+        grouped: set[str] = set()
+        for group in self.problem.interchangeable:
+            twice = grouped & set(group)
+            if twice or len(set(group)) != len(group):
+                raise DefinitionError(f"{place}: expected each action in one group; {sorted(twice) or group} is not.")
+            grouped |= set(group)
+            # An action that the user's precedence singles out is no longer like the others.
+            members = [index[name] for name in group if name in index and index[name] not in constrained]
+            for member in members:
+                classes[member] = members[0]
+        return tuple(classes)
+
+
+class BitState:
+    """A bitset state as derived predicates see it."""
+
+    __slots__ = ("_bits", "_ground")
+
+    def __init__(self, ground: GroundProblem, bits: int) -> None:
+        self._ground = ground
+        self._bits = bits
+
+    def holds(self, atom: Atom) -> bool:
+        bit = self._ground._bits.get(atom)
+        return bit is not None and bool(self._bits >> bit & 1)
+
+    def objects(self, fluent: Fluent) -> tuple[str, ...]:
+        start, names = self._ground.runs[fluent]
+        run = self._bits >> start
+        return tuple(name for i, name in enumerate(names) if run >> i & 1)
+
+    def mask(self, fluent: Fluent, names: tuple[str, ...]) -> int:
+        start, own = self._ground.runs[fluent]
+        if own == names:
+            return (self._bits >> start) & ((1 << len(own)) - 1)
+        position = {name: i for i, name in enumerate(own)}
+        run = self._bits >> start
+        return sum(1 << i for i, name in enumerate(names) if name in position and run >> position[name] & 1)
+
+
+def _ask(predicate: Derived, world: object, view: BitState, args: tuple[str, ...]) -> Verdict:
+    verdict = predicate.function(world, view, *args)
+    if not isinstance(verdict, Verdict):
+        raise ContractError(
+            f"Expected the derived predicate {predicate} to answer with a Verdict; got {verdict!r}. "
+            "Write ns.Verdict(holds, because=(...), reason='...')."
+        )
+    return verdict
+
+
+def _reachable(initial: set[Atom], instances: Sequence[_Instance]) -> list[_Instance]:
+    """Instances that some sequence of actions may reach, when nothing that was ever true or false is lost."""
+    true = set(initial)
+    untrue_possible = {e.atom for i in instances for e in i.eff if not e.positive}
+    waiting, found = list(instances), []
+    while True:
+        now = [
+            i
+            for i in waiting
+            if all(
+                p.atom in true if p.positive else p.atom not in initial or p.atom in untrue_possible
+                for p in i.fluents
+            )
+        ]
+        if not now:
+            break
+        found.extend(now)
+        waiting = [i for i in waiting if i not in now]
+        for i in now:
+            true.update(e.atom for e in i.eff if e.positive)
+    order = {id(i): k for k, i in enumerate(instances)}
+    return sorted(found, key=lambda i: order[id(i)])

@@ -1,0 +1,183 @@
+"""Terms: types, variables, fluents, derived predicates, and the atoms and literals made of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from neurosym.errors import DefinitionError
+from neurosym.problem import Verdict
+
+
+@dataclass(frozen=True)
+class Type:
+    """A type of objects, as in PDDL; calling it makes a variable: ``part("p")``."""
+
+    name: str
+    parent: Type | None = None
+
+    def __post_init__(self) -> None:
+        _check_name("type", self.name)
+
+    def __call__(self, name: str) -> Variable:
+        return Variable(name, self)
+
+    def is_a(self, other: Type) -> bool:
+        """Whether this is `other` or a descendant of it."""
+        kind: Type | None = self
+        while kind is not None:
+            if kind == other:
+                return True
+            kind = kind.parent
+        return False
+
+    def __str__(self) -> str:
+        return self.name
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A parameter of an action: a name with a type."""
+
+    name: str
+    type: Type
+
+    def __post_init__(self) -> None:
+        _check_name("variable", self.name)
+
+    def __str__(self) -> str:
+        return self.name
+
+
+#: What an atom is made of: a variable in an action, the name of an object elsewhere.
+Term = Variable | str
+
+
+class _Predicate:
+    """What fluents and derived predicates share: a name, argument types, and being called."""
+
+    __slots__ = ("name", "types")
+
+    def __init__(self, name: str, types: Sequence[Type]) -> None:
+        _check_name("predicate", name)
+        for position, kind in enumerate(types):
+            if not isinstance(kind, Type):
+                raise DefinitionError(
+                    f"In {name!r}: expected a Type for argument {position}; got {kind!r}. Make one with ns.Type(...)."
+                )
+        self.name = name
+        self.types = tuple(types)
+
+    def __call__(self, *args: Term) -> Atom:
+        if len(args) != len(self.types):
+            expected = ", ".join(map(str, self.types)) or "none"
+            raise DefinitionError(
+                f"In {self.name}({', '.join(map(str, args))}): expected {len(self.types)} arguments ({expected}); "
+                f"got {len(args)}."
+            )
+        for arg, kind in zip(args, self.types):
+            if isinstance(arg, Variable):
+                if not arg.type.is_a(kind):
+                    raise DefinitionError(
+                        f"In {self.name}({', '.join(map(str, args))}): expected a {kind}; "
+                        f"the variable {arg} is a {arg.type}."
+                    )
+            elif not isinstance(arg, str):
+                raise DefinitionError(
+                    f"In {self.name}(...): expected a variable or the name of an object; got {arg!r}."
+                )
+        return Atom(self, args)
+
+    def __str__(self) -> str:
+        return self.name
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.name!r}, {', '.join(map(str, self.types))})"
+
+
+class Fluent(_Predicate):
+    """A fact that actions change: ``present = Fluent("present", part)``, then ``present("a")``, ``~present(p)``."""
+
+    __slots__ = ()
+
+    def __init__(self, name: str, *types: Type) -> None:
+        super().__init__(name, types)
+
+
+class Derived(_Predicate):
+    """A predicate that is computed from the world and the state, not changed by effects.
+
+    Its function takes the world, the state and the names of the objects, and answers with a `Verdict`.
+    """
+
+    __slots__ = ("function",)
+
+    def __init__(self, name: str, types: Sequence[Type], function: Callable[..., Verdict]) -> None:
+        super().__init__(name, types)
+        self.function = function
+
+
+def derived(*types: Type) -> Callable[[Callable[..., Verdict]], Derived]:
+    """Make a predicate of one's own from a function ``(world, state, *names) -> Verdict``::
+
+    @ns.derived(part)
+    def light_enough(world, state, p): ...
+    """
+
+    def decorate(function: Callable[..., Verdict]) -> Derived:
+        return Derived(function.__name__, types, function)
+
+    return decorate
+
+
+@dataclass(frozen=True, slots=True)
+class Atom:
+    """A predicate with its arguments. ``~atom`` is its negation."""
+
+    predicate: _Predicate
+    args: tuple[Term, ...]
+
+    def __invert__(self) -> Literal:
+        return Literal(self, False)
+
+    def bind(self, binding: dict[str, str]) -> Atom:
+        """The atom with its variables replaced by objects."""
+        return Atom(self.predicate, tuple(binding[a.name] if isinstance(a, Variable) else a for a in self.args))
+
+    def __str__(self) -> str:
+        return f"{self.predicate}({', '.join(map(str, self.args))})"
+
+
+@dataclass(frozen=True, slots=True)
+class Literal:
+    """An atom, or its negation."""
+
+    atom: Atom
+    positive: bool = True
+
+    def __invert__(self) -> Literal:
+        return Literal(self.atom, not self.positive)
+
+    def bind(self, binding: dict[str, str]) -> Literal:
+        return Literal(self.atom.bind(binding), self.positive)
+
+    def __str__(self) -> str:
+        return str(self.atom) if self.positive else f"not {self.atom}"
+
+
+Condition = Atom | Literal
+
+
+def as_literal(condition: Any, place: str) -> Literal:
+    """A condition as a literal; anything else is refused, naming the place."""
+    if isinstance(condition, Literal):
+        return condition
+    if isinstance(condition, Atom):
+        return Literal(condition)
+    raise DefinitionError(f"In {place}: expected an atom such as present(p), or ~present(p); got {condition!r}.")
+
+
+def _check_name(kind: str, name: object) -> None:
+    if not isinstance(name, str) or not name or name != name.strip():
+        raise DefinitionError(f"Expected a {kind} name that is a non-empty text without outer spaces; got {name!r}.")
