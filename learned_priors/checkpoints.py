@@ -1,0 +1,93 @@
+"""Weights and training state on disk: safetensors with a JSON header. No pickle is written or read.
+
+A file is complete or absent: it is written beside its place and renamed.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import safetensors.torch
+import torch
+from safetensors import SafetensorError
+from torch import Tensor
+
+from learned_priors.networks import NetworkConfig, OrderNetwork
+from neurosym.errors import CheckpointError
+from neurosym.weights_header import read_header
+
+#: Of the header; raised when an older reader would misread a file.
+SCHEMA = 1
+
+
+def write_tensors(path: Path, tensors: Mapping[str, Tensor], header: Mapping[str, Any]) -> None:
+    """Write tensors and a header; equal input gives equal bytes."""
+    # One metadata key holding sorted JSON: safetensors keeps no order among several.
+    text = json.dumps({"schema": SCHEMA, **header}, sort_keys=True)
+    plain = {name: tensor.detach().cpu().contiguous() for name, tensor in tensors.items()}
+    data = safetensors.torch.save(plain, metadata={"neurosym": text})
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".tmp")
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(data)
+        os.replace(temporary, path)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
+
+
+def read_tensors(path: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
+    """What `write_tensors` wrote. Raises `CheckpointError` for a damaged file or one of another schema."""
+    header = read_header(path)
+    if header.get("schema") != SCHEMA:
+        raise CheckpointError(
+            f"Expected schema {SCHEMA} in {path}; got {header.get('schema')!r}. "
+            "It was written by another version: train again, or install that version."
+        )
+    try:
+        return safetensors.torch.load(path.read_bytes()), header
+    except (SafetensorError, OSError, ValueError) as error:
+        raise CheckpointError(f"Expected {path} to be whole; it is damaged ({error}). Make it again.") from None
+
+
+def save_network(path: Path, network: OrderNetwork, header: Mapping[str, Any]) -> None:
+    """Write a network's weights in float16 (`fit` rounds them to it, so nothing is lost) and its header."""
+    if path.suffix != ".safetensors":
+        raise CheckpointError(f"Expected a file name that ends in .safetensors; got {path.name!r}.")
+    tensors = {name: tensor.to(torch.float16) for name, tensor in network.state_dict().items()}
+    write_tensors(path, tensors, {**header, "network": network.config.to_json()})
+
+
+def load_network(path: Path) -> tuple[OrderNetwork, dict[str, Any]]:
+    """A network in float32 on the CPU, ready to read, and its header."""
+    tensors, header = read_tensors(path)
+    actions = header.get("actions")
+    given = header.get("network")
+    if not isinstance(given, dict) or not isinstance(actions, list) or not all(isinstance(a, str) for a in actions):
+        raise CheckpointError(f"Expected {path} to say in its header: prior, domain, actions, network; it does not.")
+    config = NetworkConfig.from_json(given)
+    if len(actions) != config.n_actions:
+        raise CheckpointError(f"Expected {config.n_actions} action names in {path}; got {len(actions)}.")
+    # On the meta device nothing is allocated or drawn: shapes are compared before memory is asked for.
+    with torch.device("meta"):
+        network = OrderNetwork(config)
+    expected = {name: tuple(tensor.shape) for name, tensor in network.state_dict().items()}
+    got = {name: tuple(tensor.shape) for name, tensor in tensors.items()}
+    if expected != got:
+        different = sorted(n for n in expected.keys() | got.keys() if expected.get(n) != got.get(n))
+        name = different[0]
+        raise CheckpointError(
+            f"Expected in {path} the weights of the network that its header describes; {name} should be of shape "
+            f"{expected.get(name, 'absent')}, got {got.get(name, 'absent')}."
+        )
+    if not all(bool(torch.isfinite(tensor).all()) for tensor in tensors.values()):
+        raise CheckpointError(f"Expected finite weights in {path}; some are not. Train again.")
+    network.load_state_dict({name: tensor.to(torch.float32) for name, tensor in tensors.items()}, assign=True)
+    network.requires_grad_(False)
+    return network.eval(), header

@@ -1,0 +1,133 @@
+"""Encoders: from the pictures of one piece of finished work to a feature vector. Chosen by name.
+
+`prepare` is fixed work without parameters (pooling, rearranging) that training does once, before its epochs;
+`forward` is what is learned.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from neurosym.errors import InputError, UnknownNameError
+
+#: (V, H, W, 3): views, height, width, colours.
+PictureShape = tuple[int, int, int, int]
+
+#: Pixels of 0 to 255 are brought to about -1 to 1.
+_CENTRE, _SCALE = 127.5, 127.5
+
+
+class Encoder(nn.Module, ABC):
+    """Pictures -> features.
+
+    Attributes:
+        out_features: length of the feature vector.
+    """
+
+    out_features: int
+
+    @abstractmethod
+    def prepare(self, pictures: Tensor) -> Tensor:
+        """uint8 (B, V, H, W, 3) -> whatever `forward` takes, first axis B; no picture depends on its neighbours."""
+
+    @abstractmethod
+    def forward(self, prepared: Tensor) -> Tensor:
+        """What `prepare` gave -> float (B, out_features)."""
+
+
+class SmallEncoder(Encoder):
+    """Mean-pools each view to 16 x 16, one perceptron shared by the views, then one over all views.
+
+    On pictures of assemblies of some ten parts it is two to ten times faster than convolutions and no worse: what
+    matters there is which colour is where, coarsely.
+    """
+
+    SIDE = 16
+
+    def __init__(self, shape: PictureShape, *, hidden: int = 192, view: int = 96, out_features: int = 256) -> None:
+        super().__init__()
+        self.out_features = out_features
+        self.each = nn.Sequential(nn.Linear(3 * self.SIDE**2, hidden), nn.ReLU(), nn.Linear(hidden, view), nn.ReLU())
+        self.all = nn.Sequential(nn.Linear(shape[0] * view, out_features), nn.ReLU())
+
+    def prepare(self, pictures: Tensor) -> Tensor:
+        views = pictures.flatten(0, 1).permute(0, 3, 1, 2).to(torch.float32)
+        pooled = functional.adaptive_avg_pool2d(views, self.SIDE).flatten(1)
+        return ((pooled - _CENTRE) / _SCALE).reshape(*pictures.shape[:2], -1)
+
+    def forward(self, prepared: Tensor) -> Tensor:
+        features: Tensor = self.all(self.each(prepared).flatten(1))
+        return features
+
+
+class PaperEncoder(Encoder):
+    """The convolutional network of Burke et al. (RA-L 2021, appendix), views stacked as channels (12 for Soma).
+
+    32, 64, pool, 128, pool, 256, pool (kernels 5 x 5, unpadded, ReLU; pools 2 x 2), dropout 0.5, 128 neurons, ReLU.
+    """
+
+    LEAST = 40  #: pixels; below, the unpadded convolutions leave nothing
+
+    def __init__(self, shape: PictureShape, *, out_features: int = 128, dropout: float = 0.5) -> None:
+        super().__init__()
+        views, height, width, colours = shape
+        if min(height, width) < self.LEAST:
+            raise InputError(
+                f"Expected pictures of at least {self.LEAST} x {self.LEAST} pixels for the encoder 'paper'; "
+                f"got {height} x {width}. Use encoder='small', or larger pictures."
+            )
+        self.out_features = out_features
+        self.convolutions = nn.Sequential(
+            nn.Conv2d(views * colours, 32, 5),
+            nn.ReLU(),
+            nn.Conv2d(32, 64, 5),
+            nn.ReLU(),
+            nn.MaxPool2d(2),
+            nn.Conv2d(64, 128, 5),
+            nn.ReLU(),
+            nn.MaxPool2d(2),
+            nn.Conv2d(128, 256, 5),
+            nn.ReLU(),
+            nn.MaxPool2d(2),
+        )
+        left = [(((side - 8) // 2 - 4) // 2 - 4) // 2 for side in (height, width)]
+        self.dense = nn.Sequential(nn.Dropout(dropout), nn.Linear(256 * left[0] * left[1], out_features), nn.ReLU())
+
+    def prepare(self, pictures: Tensor) -> Tensor:
+        # Kept as bytes: thousands of pictures stay resident while a network learns.
+        return pictures.permute(0, 1, 4, 2, 3).flatten(1, 2).contiguous()
+
+    def forward(self, prepared: Tensor) -> Tensor:
+        x = (prepared.to(torch.float32) - _CENTRE) / _SCALE
+        features: Tensor = self.dense(self.convolutions(x).flatten(1))
+        return features
+
+
+#: A factory takes the picture shape and gives an encoder.
+EncoderFactory = Callable[[PictureShape], Encoder]
+
+_ENCODERS: dict[str, EncoderFactory] = {"small": SmallEncoder, "paper": PaperEncoder}
+
+
+def register_encoder(name: str, factory: EncoderFactory) -> None:
+    """Make an encoder known by name; weights that name it can be loaded wherever it is registered first."""
+    if name in _ENCODERS and _ENCODERS[name] is not factory:
+        raise InputError(f"Expected a name that no encoder has yet; got {name!r}. Known: {', '.join(encoder_names())}.")
+    _ENCODERS[name] = factory
+
+
+def encoder_names() -> list[str]:
+    """Names that `build_encoder` takes."""
+    return sorted(_ENCODERS)
+
+
+def build_encoder(name: str, shape: PictureShape) -> Encoder:
+    """The encoder of that name for pictures of that shape. Raises `UnknownNameError`, which lists the names."""
+    if name not in _ENCODERS:
+        raise UnknownNameError("picture encoder", name, _ENCODERS)
+    return _ENCODERS[name](shape)

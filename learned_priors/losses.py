@@ -1,0 +1,79 @@
+"""What the networks are trained on: log-probabilities by step against demonstrated orders, or shares of valid ones."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import torch
+from torch import Tensor
+from torch.nn import functional
+
+from learned_priors.recipes import TrainConfig
+from learned_priors.sinkhorn import gumbel_sinkhorn, log_sinkhorn
+
+
+def targets_of(sequences: Tensor, n_actions: int, marginals: Tensor | None = None) -> Tensor:
+    """float32 (M, T, N): the marginals, or one-hot sequences (int64 (M, T), -1 where a step is not taken).
+
+    Steps that are not taken are rows of zeros; the losses below leave them out (the paper's masking, Sec. IV-B).
+    """
+    taken = sequences >= 0
+    target = marginals if marginals is not None else functional.one_hot(sequences.clamp(min=0), n_actions)
+    return target.to(torch.float32) * taken[..., None]
+
+
+def summed_by_class(log_prob: Tensor, classes: Sequence[int]) -> Tensor:
+    """Log of each class's probability: (..., N) -> (..., C), classes in increasing order.
+
+    Interchangeable actions (two blocks of one colour) cannot be told apart in a picture; asking for one of them by
+    name asks the network to guess.
+    """
+    ids, column = torch.unique(torch.as_tensor(list(classes), device=log_prob.device), return_inverse=True)
+    if len(ids) == log_prob.shape[-1]:
+        return log_prob[..., torch.argsort(column)]
+    index = column.expand_as(log_prob)
+    empty = log_prob.new_full((*log_prob.shape[:-1], len(ids)), -torch.inf)
+    # The largest member is taken out first, so that no class underflows; it only shifts, so it needs no gradient.
+    top = empty.scatter_reduce(-1, index, log_prob.detach(), "amax")
+    share = torch.exp(log_prob - top.gather(-1, index))
+    return torch.zeros_like(empty).scatter_add(-1, index, share).log() + top
+
+
+def cross_entropy(log_prob: Tensor, target: Tensor, classes: Sequence[int] = ()) -> Tensor:
+    """Mean over the steps taken of -sum_j target_ij log P_ij (nats). Both (B, T, N); actions summed by class."""
+    if classes:
+        log_prob = summed_by_class(log_prob, classes)
+        ids, column = torch.unique(torch.as_tensor(list(classes), device=target.device), return_inverse=True)
+        summed = target.new_zeros((*target.shape[:-1], len(ids)))
+        target = summed.scatter_add(-1, column.expand_as(target), target)
+    steps = target.sum(dim=-1).sum().clamp(min=1.0)
+    return -(target * log_prob).sum() / steps
+
+
+def squared_error(log_samples: Tensor, target: Tensor) -> Tensor:
+    """The paper's loss (eq. 7): mean squared difference of P a_o and a_j, a_o the identity, over steps taken.
+
+    Shapes: samples of log P (K, B, T, N); one-hot demonstrations (B, T, N).
+    """
+    taken = target.sum(dim=-1, keepdim=True) > 0
+    off = (log_samples.exp() - target) ** 2 * taken
+    entries = taken.sum().clamp(min=1) * target.shape[-1] * log_samples.shape[0]
+    return off.sum() / entries
+
+
+def loss_of(logits: Tensor, target: Tensor, config: TrainConfig) -> Tensor:
+    """The training loss of logits (B, T, N) against targets (B, T, N), a scalar."""
+    if config.loss == "gumbel-sinkhorn":
+        samples = gumbel_sinkhorn(
+            logits,
+            samples=config.samples,
+            temperature=config.temperature,
+            noise=config.noise,
+            iterations=config.iterations,
+        )
+        return squared_error(samples, target)
+    if config.loss == "sinkhorn":
+        log_prob = log_sinkhorn(logits / config.temperature, tolerance=None, max_iterations=config.iterations)
+    else:
+        log_prob = torch.log_softmax(logits, dim=-1)
+    return cross_entropy(log_prob, target, config.classes)

@@ -1,0 +1,251 @@
+"""`NetworkPrior`: order scores from pictures, by a network that was trained, or that `fit` trains."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Self, overload
+
+import numpy as np
+import torch
+from numpy.typing import ArrayLike, NDArray
+
+from learned_priors import bundled
+from learned_priors.checkpoints import load_network, save_network
+from learned_priors.learner import CHUNK
+from learned_priors.networks import NetworkConfig, OrderNetwork
+from learned_priors.recipes import Recipe, TrainConfig, recipe_named
+from learned_priors.training import FitProgress, fit
+from neurosym.demonstrations import Demonstrations
+from neurosym.errors import CheckpointError, InputError
+from neurosym.prior import OrderScores, Prior, as_picture_batch
+
+if TYPE_CHECKING:
+    from neurosym.language.domain import Problem
+
+
+@dataclass(frozen=True, eq=False)
+class _Weights:
+    """A network with its header, and the file it came from (None: it was trained here)."""
+
+    network: OrderNetwork
+    header: dict[str, Any]
+    path: Path | None = None
+
+
+class NetworkPrior(Prior):
+    """A prior that looks at pictures of finished work.
+
+    Of a problem it reads the pictures and the names of the actions, nothing else: the same pictures with other
+    geometry behind them get the same scores.
+
+    Args:
+        recipe: a name in `learned_priors.recipes.RECIPES`, or a `Recipe`.
+        weights: a ``.safetensors`` file written by `save`. None takes weights that come with the package, chosen by
+            the problem's domain when they are first needed.
+        domain: whose bundled weights to take; None asks each problem.
+        encoder: what `fit` builds (``"small"``, ``"paper"``, or one registered); None is the small one.
+        device: ``"cpu"`` or ``"cuda"``; reading and training happen there.
+
+    Raises:
+        CheckpointError: the file is damaged, of another recipe or another schema.
+        InputError: the device is not there.
+    """
+
+    def __init__(
+        self,
+        recipe: str | Recipe,
+        *,
+        weights: str | Path | None = None,
+        domain: str | None = None,
+        encoder: str | None = None,
+        device: str = "cpu",
+    ) -> None:
+        self.recipe = recipe if isinstance(recipe, Recipe) else recipe_named(recipe)
+        self.domain = domain
+        self.encoder = encoder
+        self.device = _checked_device(device)
+        self._own: _Weights | None = None
+        self._choices: dict[Hashable, _Weights] = {}
+        if weights is not None:
+            self._own = self._loaded(Path(weights))
+
+    @property
+    def header(self) -> dict[str, Any]:
+        """What the weights say of themselves: prior, domain, actions, network, training. Empty before there are any."""
+        return dict(self._own.header) if self._own else {}
+
+    @overload
+    def read(self, pictures: NDArray[np.uint8]) -> OrderScores: ...
+    @overload
+    def read(self, pictures: ArrayLike) -> OrderScores | list[OrderScores]: ...
+    def read(self, pictures: ArrayLike) -> OrderScores | list[OrderScores]:
+        """Order scores from pictures alone.
+
+        Args:
+            pictures: uint8 (V, H, W, 3) of one piece of work, or a batch (M, V, H, W, 3).
+
+        Returns:
+            One `OrderScores` for one set of pictures, a list of M for a batch; columns named as in the training.
+        """
+        batch, single = as_picture_batch(pictures)
+        weights = self._weights_for_pictures(batch.shape[1:])
+        found = self._read(weights, batch)
+        return found[0] if single else found
+
+    def scores(self, problems: Sequence[Problem]) -> list[OrderScores]:
+        """One `OrderScores` a problem, columns in the order of its actions; problems are read in batches.
+
+        A problem with fewer actions than the network knows (a partial start) gets the last steps and its columns.
+
+        Raises:
+            InputError: a problem has no pictures, pictures of another shape, or actions that the network does not know.
+        """
+        groups: dict[_Weights, list[int]] = {}
+        for k, problem in enumerate(problems):
+            if problem.observation is None:
+                raise InputError(
+                    f"Expected pictures of the problem {problem.name!r}, from which this prior reads; it has none. "
+                    "Give it an observation, uint8 (V, H, W, 3), or plan with prior=None."
+                )
+            groups.setdefault(self._weights_for_problem(problem), []).append(k)
+        found: dict[int, OrderScores] = {}
+        for weights, index in groups.items():
+            pictures = [_checked_pictures(np.asarray(problems[k].observation), weights) for k in index]
+            for k, scores in zip(index, self._read(weights, np.stack(pictures))):
+                left = scores.restricted(problems[k].actions)
+                found[k] = OrderScores(left.log_prob, left.actions, left.log_length, tuple(problems[k].classes))
+        return [found[k] for k in range(len(problems))]
+
+    def fit(
+        self,
+        demonstrations: Demonstrations,
+        *,
+        seed: int = 0,
+        epochs: int | None = None,
+        device: str | None = None,
+        progress: Callable[[FitProgress], None] | None = None,
+        checkpoint: str | Path | None = None,
+        resume: bool = True,
+        config: TrainConfig | None = None,
+    ) -> Self:
+        """Train a network on demonstrations; this prior then reads with it. Returns itself.
+
+        Args:
+            seed: the same seed gives the same weights, on the CPU with the same number of threads.
+            epochs: None takes the recipe's; a number is taken as it is.
+            device: where to train, and to read afterwards; None is this prior's.
+            progress: called after each epoch.
+            checkpoint: file that keeps the state of the run; see `learned_priors.training.fit`.
+            resume: go on from the checkpoint if it is there.
+            config: instead of the recipe's `TrainConfig`.
+        """
+        if device is not None:
+            self.device = _checked_device(device)
+        train = config or self.recipe.train
+        if epochs is not None:
+            if epochs < 1:
+                raise InputError(f"Expected at least one epoch; got {epochs}.")
+            train = replace(train, epochs=epochs, least_steps=0)
+        views, height, width, colours = demonstrations.pictures.shape[1:]
+        network = NetworkConfig(
+            encoder=self.encoder or "small",
+            head=self.recipe.head,
+            decoding=self.recipe.decoding,
+            picture_shape=(views, height, width, colours),
+            n_steps=demonstrations.sequences.shape[1],
+            n_actions=len(demonstrations.actions),
+            width=self.recipe.width,
+            temperature=train.temperature,
+        )
+        fitted = fit(
+            demonstrations,
+            network,
+            train,
+            seed=seed,
+            device=str(self.device),
+            progress=progress,
+            checkpoint=Path(checkpoint) if checkpoint else None,
+            resume=resume,
+        )
+        header = {
+            "prior": self.recipe.name,
+            "domain": demonstrations.domain,
+            "actions": list(demonstrations.actions),
+            "training": fitted.figures,
+        }
+        self._own = _Weights(fitted.network, header)
+        return self
+
+    def save(self, path: str | Path) -> Path:
+        """Write the weights and their header to a ``.safetensors`` file (whole or not at all); returns its path."""
+        if self._own is None:
+            raise InputError("Expected a prior that was trained, or given weights; this one has none. Call fit first.")
+        save_network(Path(path), self._own.network, self._own.header)
+        return Path(path)
+
+    @torch.inference_mode()
+    def _read(self, weights: _Weights, batch: NDArray[np.uint8]) -> list[OrderScores]:
+        network, actions = weights.network, tuple(weights.header["actions"])
+        if len(batch):
+            _checked_pictures(batch[0], weights)
+        found: list[OrderScores] = []
+        for start in range(0, len(batch), CHUNK):
+            pictures = torch.from_numpy(np.ascontiguousarray(batch[start : start + CHUNK])).to(self.device)
+            tables = network.log_prob(network(network.prepare(pictures))).cpu().numpy()
+            found += [OrderScores(table, actions) for table in tables]
+        return found
+
+    def _loaded(self, path: Path) -> _Weights:
+        network, header = load_network(path)
+        if header.get("prior") != self.recipe.name:
+            raise CheckpointError(
+                f"Expected weights of the prior {self.recipe.name!r} in {path}; got those of {header.get('prior')!r}. "
+                f"Load them by the file's name: load_prior({str(path)!r})."
+            )
+        if self.encoder not in (None, network.config.encoder):
+            raise CheckpointError(
+                f"Expected weights of the encoder {self.encoder!r} in {path}; got {network.config.encoder!r}. "
+                "Leave encoder=None to take what the file has."
+            )
+        return _Weights(network.to(self.device), header, path)
+
+    def _weights_for_problem(self, problem: Problem) -> _Weights:
+        family, actions = problem.family, tuple(problem.actions)
+        return self._weights((family, actions), lambda: bundled.for_actions(self.recipe.name, family, actions))
+
+    def _weights_for_pictures(self, shape: tuple[int, ...]) -> _Weights:
+        return self._weights(shape, lambda: bundled.for_pictures(self.recipe.name, shape))
+
+    def _weights(self, question: Hashable, choose: Callable[[], Path]) -> _Weights:
+        """Our own weights, or bundled ones; which file answers a question is looked up once, and loaded once."""
+        if self._own:
+            return self._own
+        if question not in self._choices:
+            name = self.recipe.name
+            path = bundled.for_domain(name, self.domain) if self.domain is not None else choose()
+            known = [w for w in self._choices.values() if w.path == path]
+            self._choices[question] = known[0] if known else self._loaded(path)
+        return self._choices[question]
+
+
+def _checked_device(name: str) -> torch.device:
+    try:
+        device = torch.device(name)
+    except RuntimeError:
+        raise InputError(f"Expected a device, 'cpu' or 'cuda'; got {name!r}.") from None
+    if device.type == "cuda" and not torch.cuda.is_available():
+        raise InputError("Expected a CUDA device, as asked for; torch finds none. Use device='cpu'.")
+    return device
+
+
+def _checked_pictures(pictures: NDArray[np.uint8], weights: _Weights) -> NDArray[np.uint8]:
+    """The pictures of one piece of work, if they are such as the network was trained on."""
+    expected = weights.network.config.picture_shape
+    if pictures.shape != expected or pictures.dtype != np.uint8:
+        raise InputError(
+            f"Expected pictures as uint8 (V, H, W, 3) = {expected}, as this prior was trained on; "
+            f"got {pictures.dtype} {pictures.shape}. Render them alike, or train a prior on yours."
+        )
+    return pictures

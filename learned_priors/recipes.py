@@ -1,0 +1,106 @@
+"""What each named prior is made of: the network's head, and how it is trained."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+from learned_priors.networks import Decoding, Head
+from neurosym.errors import UnknownNameError
+
+Loss = Literal["gumbel-sinkhorn", "sinkhorn", "rows"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrainConfig:
+    """How a network is trained.
+
+    Attributes:
+        loss: "gumbel-sinkhorn" (the paper's: samples of the permutation against the demonstration, mean squared
+            error), "sinkhorn" (cross-entropy of log S(X)) or "rows" (cross-entropy of a softmax a step).
+        soft: learn from the demonstrations' marginals where there are some; otherwise from their sequences.
+        epochs: passes over the demonstrations.
+        least_steps: with few demonstrations, epochs are added until so many updates are made.
+        batch: demonstrations an update.
+        optimizer: "adam" or "adamw" (with `weight_decay`).
+        rate: learning rate (the peak, with "one-cycle").
+        schedule: "constant", or "one-cycle" (up for 30% of the updates, then down to nothing, by cosines).
+        iterations: of the Sinkhorn operator, a fixed number in training.
+        samples, temperature, noise: of Gumbel-Sinkhorn.
+        classes: one integer an action; actions of one class are interchangeable, their probabilities are summed
+            before the logarithm. Empty: each is its own.
+        held_out: share of the groups of demonstrations that is kept from training and only measured.
+        keep: "last" or "best", the weights of the epoch with the least held-out loss.
+        patience: stop when the held-out loss has not improved for so many epochs; None never stops early.
+        precision: "float32" or "bfloat16" (autocast; pays for convolutions on hardware made for it).
+        checkpoint_seconds: least time between two checkpoints, if one is asked for.
+    """
+
+    loss: Loss
+    soft: bool
+    epochs: int
+    least_steps: int = 0
+    batch: int = 128
+    optimizer: Literal["adam", "adamw"] = "adamw"
+    weight_decay: float = 0.01
+    rate: float = 2e-3
+    schedule: Literal["constant", "one-cycle"] = "one-cycle"
+    iterations: int = 20
+    samples: int = 5
+    temperature: float = 1.0
+    noise: float = 1.0
+    classes: tuple[int, ...] = ()
+    held_out: float = 0.0
+    keep: Literal["last", "best"] = "last"
+    patience: int | None = None
+    precision: Literal["float32", "bfloat16"] = "float32"
+    checkpoint_seconds: float = 5.0
+
+    def to_json(self) -> dict[str, Any]:
+        return {**asdict(self), "classes": list(self.classes)}
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """A named prior: its head, how it is decoded, and its training."""
+
+    name: str
+    head: Head
+    width: int
+    decoding: Decoding
+    train: TrainConfig
+
+
+# The paper trains for thousands of epochs; on Soma the held-out error stops falling long before, and then rises.
+_PAPER = {"optimizer": "adam", "rate": 3e-4, "schedule": "constant", "batch": 32, "weight_decay": 0.0}
+
+RECIPES = {
+    recipe.name: recipe
+    for recipe in (
+        Recipe(
+            "sinkhorn", "dense", 128, "sinkhorn", TrainConfig(loss="sinkhorn", soft=True, epochs=60, least_steps=1500)
+        ),
+        Recipe("tcn", "tcn", 32, "rows", TrainConfig(loss="rows", soft=True, epochs=60, least_steps=1500)),
+        Recipe(
+            "sinkhorn-paper",
+            "dense",
+            128,
+            "sinkhorn",
+            TrainConfig(loss="gumbel-sinkhorn", soft=False, epochs=150, **_PAPER),  # type: ignore[arg-type]
+        ),
+        Recipe(
+            "tcn-paper",
+            "tcn",
+            16,
+            "rows",
+            TrainConfig(loss="rows", soft=False, epochs=150, **_PAPER),  # type: ignore[arg-type]
+        ),
+    )
+}
+
+
+def recipe_named(name: str) -> Recipe:
+    """The recipe of that name. Raises `UnknownNameError`, which lists the names."""
+    if name not in RECIPES:
+        raise UnknownNameError("training recipe", name, RECIPES)
+    return RECIPES[name]

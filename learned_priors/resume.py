@@ -1,0 +1,91 @@
+"""The state of a training run on disk, so that a run that was killed goes on where it was."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from learned_priors.checkpoints import read_tensors, write_tensors
+from learned_priors.networks import NetworkConfig, OrderNetwork
+from learned_priors.recipes import TrainConfig
+from neurosym.demonstrations import Demonstrations
+from neurosym.errors import CheckpointError
+
+_KIND = "training-state"
+
+
+@dataclass
+class RunState:
+    """Where a run is: `step` updates into epoch number `epoch` (from 0), and what it has seen."""
+
+    epoch: int = 0
+    step: int = 0
+    updates: int = 0
+    loss_sum: float = 0.0
+    seconds: float = 0.0
+    best_loss: float = math.inf
+    best_epoch: int = 0
+    stopped: bool = False
+    figures: dict[str, float | None] = field(default_factory=dict)
+    best: dict[str, Tensor] = field(default_factory=dict)
+
+
+def fingerprint(demonstrations: Demonstrations, network: NetworkConfig, config: TrainConfig, seed: int) -> str:
+    """What must agree for a run to go on: the demonstrations, the network, the settings and the seed."""
+    settings = {k: v for k, v in config.to_json().items() if k != "checkpoint_seconds"}
+    text = json.dumps([network.to_json(), settings, seed, demonstrations.actions], sort_keys=True)
+    digest = hashlib.blake2b(text.encode(), digest_size=16)
+    arrays = (demonstrations.pictures, demonstrations.sequences, demonstrations.groups, demonstrations.marginals)
+    for array in arrays:
+        if array is not None:
+            digest.update(str((array.dtype, array.shape)).encode())
+            digest.update(np.ascontiguousarray(array).data)
+    return digest.hexdigest()
+
+
+def save_state(path: Path, mark: str, state: RunState, network: OrderNetwork, optimizer: torch.optim.Optimizer) -> None:
+    """Write the run's state, whole or not at all."""
+    tensors = {f"model.{name}": tensor for name, tensor in network.state_dict().items()}
+    tensors |= {f"best.{name}": tensor for name, tensor in state.best.items()}
+    for i, slots in optimizer.state_dict()["state"].items():
+        tensors |= {f"optimizer.{i}.{key}": torch.as_tensor(value) for key, value in slots.items()}
+    plain: dict[str, Any] = {k: v for k, v in vars(state).items() if k != "best"}
+    plain["best_loss"] = None if math.isinf(state.best_loss) else state.best_loss
+    write_tensors(path, tensors, {"kind": _KIND, "fingerprint": mark, "state": plain})
+
+
+def load_state(path: Path, mark: str, network: OrderNetwork, optimizer: torch.optim.Optimizer) -> RunState:
+    """Put the state at `path` into the network and the optimiser, and give the rest.
+
+    Raises `CheckpointError` if it is damaged or of another run.
+    """
+    tensors, header = read_tensors(path)
+    if header.get("kind") != _KIND or header.get("fingerprint") != mark:
+        raise CheckpointError(
+            f"Expected the checkpoint {path} to be of this run; it was made with other demonstrations, settings or "
+            "seed. Delete it, name another file, or pass resume=False to start over."
+        )
+    given = header["state"]
+    state = RunState(**{**given, "best_loss": math.inf if given["best_loss"] is None else given["best_loss"]})
+    slots: dict[int, dict[str, Tensor]] = {}
+    weights: dict[str, Tensor] = {}
+    for name, tensor in tensors.items():
+        part, _, rest = name.partition(".")
+        if part == "model":
+            weights[rest] = tensor
+        elif part == "best":
+            state.best[rest] = tensor
+        else:
+            i, _, key = rest.partition(".")
+            slots.setdefault(int(i), {})[key] = tensor
+    network.load_state_dict(weights)
+    optimizer.load_state_dict({"state": slots, "param_groups": optimizer.state_dict()["param_groups"]})
+    return state
