@@ -1,0 +1,133 @@
+"""PyBullet, kept quiet and closed: the only door through which this library reaches the simulator.
+
+PyBullet prints a banner from C when it is imported, past `sys.stdout` and `sys.stderr`. It is imported here,
+once, with the process's own file descriptors turned aside, and whatever other threads wrote meanwhile is
+passed on. A `Client` is one connection (always ``DIRECT``: no window, no server) that closes when it is left,
+when an exception passes, when it is forgotten and when Python ends.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import os
+import sys
+import tempfile
+import threading
+import weakref
+from collections.abc import Iterator
+from types import ModuleType, TracebackType
+from typing import IO, Any, cast
+
+from neurosym.errors import MissingDependencyError, NeurosymError
+
+#: What PyBullet says of its own accord: lines that begin so are dropped, all others are passed on.
+_BANNERS = (b"pybullet build time:", b"numActiveThreads", b"stopping threads", b"Thread with taskId", b"Version = ")
+
+_lock = threading.RLock()
+_module: ModuleType | None = None
+
+
+@contextlib.contextmanager
+def _without_banner() -> Iterator[None]:
+    """Turn file descriptors 1 and 2 aside, then pass on every line that is not PyBullet's banner."""
+    kept: list[tuple[int, int, IO[bytes]]] = []
+    _flush()
+    for fd in (1, 2):
+        # A daemon may run with its standard descriptors closed: then there is nothing to keep clean.
+        with contextlib.suppress(OSError):
+            saved = os.dup(fd)
+            aside = cast("IO[bytes]", tempfile.TemporaryFile())  # noqa: SIM115 - closed below, its content passed on
+            os.dup2(aside.fileno(), fd)
+            kept.append((fd, saved, aside))
+    try:
+        yield
+    finally:
+        _flush()
+        for fd, saved, aside in kept:
+            os.dup2(saved, fd)
+            os.close(saved)
+            with aside:
+                aside.seek(0)
+                rest = b"".join(line for line in aside if not line.startswith(_BANNERS))
+            if rest:
+                os.write(fd, rest)
+
+
+def _flush() -> None:
+    """Empty Python's buffers, so that what was written before or during stays on its own side."""
+    for stream in (sys.stdout, sys.stderr):
+        with contextlib.suppress(OSError, ValueError, AttributeError):
+            stream.flush()
+
+
+def pybullet() -> Any:
+    """The `pybullet` module, imported on first use and without its banner.
+
+    Raises:
+        MissingDependencyError: PyBullet is not installed.
+    """
+    global _module
+    with _lock:
+        if _module is None:
+            try:
+                with _without_banner():
+                    _module = importlib.import_module("pybullet")
+            except ImportError as error:
+                raise MissingDependencyError(
+                    "Expected PyBullet, which simulates and draws; it is not installed. Install it with "
+                    "'pip install pybullet' (wheels up to Python 3.11; later ones compile it with a C++ compiler)."
+                ) from error
+        return _module
+
+
+class Client:
+    """One connection to a simulator of its own, without a window.
+
+    Use it as a context manager, or call `close`. Attribute `p` is the `pybullet` module and `id` what its
+    functions want as ``physicsClientId``.
+
+    Raises:
+        NeurosymError: PyBullet has no connection left (it allows about a thousand at a time).
+    """
+
+    def __init__(self) -> None:
+        self.p = pybullet()
+        with _lock, _without_banner():
+            self.id: int = self.p.connect(self.p.DIRECT)
+        if self.id < 0:
+            raise NeurosymError(
+                "Expected a connection to PyBullet; it has none left. Close worlds and studios after use ('with')."
+            )
+        self._finalizer = weakref.finalize(self, _disconnect, self.p, self.id)
+
+    @property
+    def is_open(self) -> bool:
+        """Whether the connection still stands."""
+        return bool(self._finalizer.alive)
+
+    def close(self) -> None:
+        """Disconnect; closing twice does nothing."""
+        self._finalizer()
+
+    def __enter__(self) -> Client:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def open_clients() -> int:
+    """How many PyBullet connections this process holds; 0 when everything was closed."""
+    if _module is None:
+        return 0
+    # PyBullet numbers connections from 0 and reuses numbers, at most 1024 of them.
+    return sum(bool(_module.isConnected(physicsClientId=i)) for i in range(1024))
+
+
+def _disconnect(p: Any, client: int) -> None:
+    # PyBullet's own exit handler may have been faster.
+    with contextlib.suppress(p.error):
+        p.disconnect(physicsClientId=client)

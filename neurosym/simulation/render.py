@@ -1,0 +1,223 @@
+"""Pictures of assemblies, from PyBullet's software renderer: no window, no graphics card, same bits everywhere.
+
+Four views as in Burke, Subr and Ramamoorthy (2021), section V: the top and three sides (`VIEWS`). Nothing moves and
+nothing collides here: bodies are visual shapes at poses.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from neurosym.errors import InputError
+from neurosym.geometry.assembly import Assembly
+from neurosym.simulation.client import Client
+from neurosym.simulation.scene import RGB, VIEWS, Camera, Scene, Style, draw_look, scene_of, style_named
+
+#: Called with (done, total) while many pictures are made.
+Progress = Callable[[int, int], None]
+#: An assembly and the seed of its picture.
+Job = tuple[Assembly, int]
+#: Pictures that one process makes before it hands them back (about a quarter of a second's work).
+CHUNK = 48
+
+
+class PictureStudio:
+    """Cameras and a renderer, kept ready: pictures of assemblies with the same shapes only move bodies about.
+
+    A context manager. The pictures do not depend on what was drawn before.
+    """
+
+    def __init__(self) -> None:
+        self._client = Client()
+        self._p: Any = self._client.p
+        self._shapes: tuple[tuple[object, ...], ...] = ()
+        self._ids: list[int] = []
+
+    def close(self) -> None:
+        """Close the renderer; closing twice does nothing."""
+        self._client.close()
+
+    def __enter__(self) -> PictureStudio:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def views(
+        self,
+        assembly: Assembly | Scene,
+        *,
+        style: str | Style = "clean",
+        colours: Mapping[str, RGB] | None = None,
+        size: int = 64,
+        rng: np.random.Generator | None = None,
+        cameras: Sequence[Camera] = VIEWS,
+    ) -> NDArray[np.uint8]:
+        """Pictures of an assembly, one a camera.
+
+        Args:
+            assembly: the parts, or the scene made of them (then `colours` is not asked).
+            style: ``"clean"``, ``"varied"`` or a `Style`.
+            colours: part name -> RGB in 0..1; the default is `PALETTE` by the order of the parts.
+            size: height and width in pixels.
+            rng: what varies a style; a style that varies needs one.
+            cameras: where from.
+
+        Returns:
+            uint8 (n_cameras, size, size, 3).
+
+        Raises:
+            InputError: a varied style without an rng, or a size below 1.
+            UnknownNameError: no such style, or a colour for a part that is not there.
+        """
+        look_of = style_named(style)
+        if size < 1:
+            raise InputError(f"Expected pictures of at least one pixel; got size={size}.")
+        if rng is None and look_of.is_random:
+            raise InputError("Expected rng, a numpy Generator, since this style varies; got None.")
+        scene = assembly if isinstance(assembly, Scene) else scene_of(assembly, colours)
+        chance = np.random.default_rng(0) if rng is None else rng
+        look = draw_look(look_of, cameras, scene.colours, chance)
+        self._arrange(scene, look.colours)
+        pictures = np.empty((len(cameras), size, size, 3), dtype=np.uint8)
+        for i, camera in enumerate(look.cameras):
+            rgba = self._p.getCameraImage(
+                size,
+                size,
+                camera.view_matrix(),
+                camera.projection_matrix(),
+                lightDirection=look.light,
+                lightColor=(1, 1, 1),
+                lightDistance=10,
+                shadow=int(look.shadow),
+                lightAmbientCoeff=look.ambient,
+                lightDiffuseCoeff=look.diffuse,
+                lightSpecularCoeff=look.specular,
+                renderer=self._p.ER_TINY_RENDERER,
+                flags=self._p.ER_NO_SEGMENTATION_MASK,
+                physicsClientId=self._client.id,
+            )[2]
+            # A PyBullet built without numpy hands out a flat tuple.
+            pictures[i] = np.asarray(rgba, dtype=np.uint8).reshape(size, size, 4)[:, :, :3]
+        if look.noise > 0:
+            noise = chance.standard_normal(pictures.shape, dtype=np.float32) * np.float32(look.noise)
+            pictures = np.clip(np.rint(pictures + noise), 0, 255).astype(np.uint8)
+        return pictures
+
+    def _arrange(self, scene: Scene, colours: NDArray[np.float64]) -> None:
+        """Put bodies where the scene has them. The order in which bodies are made shows in single pixels along edges,
+        so bodies are reused only by a scene of the very same shapes."""
+        p, c = self._p, self._client.id
+        if scene.shapes != self._shapes:
+            p.resetSimulation(physicsClientId=c)
+            made: dict[tuple[object, ...], int] = {}
+            for i, shape in enumerate(scene.shapes):
+                if shape not in made:
+                    made[shape] = self._visual(scene, i)
+            self._ids = [p.createMultiBody(0, -1, made[shape], [0, 0, 0], physicsClientId=c) for shape in scene.shapes]
+            self._shapes = scene.shapes
+        rows = zip(self._ids, scene.position.tolist(), scene.turn.tolist(), colours[scene.owner].tolist())
+        for number, position, turn, rgb in rows:
+            p.resetBasePositionAndOrientation(number, position, turn, physicsClientId=c)
+            p.changeVisualShape(number, -1, rgbaColor=[*rgb, 1.0], physicsClientId=c)
+
+    def _visual(self, scene: Scene, i: int) -> int:
+        p, c = self._p, self._client.id
+        if i not in scene.meshes:
+            return int(p.createVisualShape(p.GEOM_BOX, halfExtents=scene.half[i].tolist(), physicsClientId=c))
+        vertices, faces = scene.meshes[i]
+        # Corners are not shared between triangles: each face keeps its own normal, and edges stay sharp.
+        triangles = (vertices * scene.half[i])[faces]
+        normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)
+        return int(
+            p.createVisualShape(
+                p.GEOM_MESH,
+                vertices=triangles.reshape(-1, 3).tolist(),
+                indices=list(range(3 * len(faces))),
+                normals=np.repeat(normals, 3, axis=0).tolist(),
+                physicsClientId=c,
+            )
+        )
+
+
+def render_views(
+    assembly: Assembly,
+    *,
+    style: str | Style = "clean",
+    colours: Mapping[str, RGB] | None = None,
+    size: int = 64,
+    rng: np.random.Generator | None = None,
+    cameras: Sequence[Camera] = VIEWS,
+) -> NDArray[np.uint8]:
+    """Pictures of one assembly, uint8 (4, size, size, 3); see `PictureStudio.views`, faster for many."""
+    with PictureStudio() as studio:
+        return studio.views(assembly, style=style, colours=colours, size=size, rng=rng, cameras=cameras)
+
+
+def render_many(
+    jobs: Sequence[Job],
+    *,
+    style: str | Style = "clean",
+    colours: Mapping[str, RGB] | None = None,
+    size: int = 64,
+    workers: int = 1,
+    progress: Progress | None = None,
+) -> NDArray[np.uint8]:
+    """Pictures of many assemblies, in order, the same for any number of workers.
+
+    Args:
+        jobs: pairs of an assembly and its seed.
+        style: as in `PictureStudio.views`.
+        colours: part name -> RGB in 0..1, for all.
+        size: height and width in pixels.
+        workers: processes; 1 stays in this one.
+        progress: called with (done, total).
+
+    Returns:
+        uint8 (len(jobs), 4, size, size, 3).
+    """
+    scenes = [(scene_of(assembly, colours), int(seed)) for assembly, seed in jobs]
+    pictures = np.empty((len(jobs), len(VIEWS), size, size, 3), dtype=np.uint8)
+    chunks = [scenes[i : i + CHUNK] for i in range(0, len(scenes), CHUNK)]
+    done = 0
+    for part in render_chunks(chunks, style_named(style), size, workers):
+        pictures[done : done + len(part)] = part
+        done += len(part)
+        if progress is not None:
+            progress(done, len(jobs))
+    return pictures
+
+
+def render_chunks(chunks: Sequence[Sequence[tuple[Scene, int]]], style: Style, size: int, workers: int) -> Any:
+    """An iterator over the pictures of each chunk, uint8 (n, 4, size, size, 3), in order."""
+    if workers == 1 or len(chunks) < 2:
+        return _in_this_process(chunks, style, size)
+    from joblib import Parallel, delayed
+
+    pool = Parallel(n_jobs=workers, return_as="generator")
+    return pool(delayed(_render_chunk)(chunk, style, size) for chunk in chunks)
+
+
+def _in_this_process(chunks: Sequence[Sequence[tuple[Scene, int]]], style: Style, size: int) -> Any:
+    with PictureStudio() as studio:
+        for chunk in chunks:
+            yield _draw(studio, chunk, style, size)
+
+
+def _render_chunk(chunk: Sequence[tuple[Scene, int]], style: Style, size: int) -> NDArray[np.uint8]:
+    with PictureStudio() as studio:
+        return _draw(studio, chunk, style, size)
+
+
+def _draw(studio: PictureStudio, chunk: Sequence[tuple[Scene, int]], style: Style, size: int) -> NDArray[np.uint8]:
+    return np.stack(
+        [studio.views(scene, style=style, size=size, rng=np.random.default_rng(seed)) for scene, seed in chunk]
+    )

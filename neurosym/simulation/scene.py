@@ -1,0 +1,275 @@
+"""What a picture is made of: cameras, light, colours, and an assembly as plain arrays."""
+
+from __future__ import annotations
+
+import colorsys
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from neurosym.errors import InputError, UnknownNameError
+from neurosym.geometry.assembly import Assembly, Box
+
+Array = NDArray[np.float64]
+RGB = tuple[float, float, float]
+
+#: Colours of parts in their order, RGB in 0..1: Okabe and Ito's, which people with any colour vision tell apart, black
+#: left out as it hides in the shade. Later parts take them again, lighter, then darker.
+PALETTE: tuple[RGB, ...] = (
+    (0.90, 0.62, 0.00),
+    (0.34, 0.71, 0.91),
+    (0.00, 0.62, 0.45),
+    (0.94, 0.89, 0.26),
+    (0.00, 0.45, 0.70),
+    (0.84, 0.37, 0.00),
+    (0.80, 0.47, 0.65),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Camera:
+    """A perspective camera that looks at the middle of the assembly.
+
+    Attributes:
+        azimuth: degrees about the vertical; 0 looks from +x, 90 from +y.
+        elevation: degrees above the horizontal; 90 looks straight down (with azimuth -90, +y is up in the picture).
+        distance: from the middle, in halves of the assembly's largest extent.
+        field_of_view: degrees, top to bottom.
+    """
+
+    azimuth: float
+    elevation: float
+    distance: float = 8.0
+    field_of_view: float = 21.0
+
+    def view_matrix(self) -> list[float]:
+        """World to camera, 16 numbers by columns (OpenGL's order)."""
+        a, e = np.radians([self.azimuth, self.elevation])
+        back = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
+        up = np.array([-np.sin(e) * np.cos(a), -np.sin(e) * np.sin(a), np.cos(e)])
+        V = np.eye(4)
+        V[:3, :3] = np.stack([np.cross(up, back), up, back])
+        V[2, 3] = -self.distance
+        return [float(x) for x in V.T.ravel()]
+
+    def projection_matrix(self) -> list[float]:
+        """Camera to clip space for square pictures, 16 numbers by columns."""
+        near, far = 0.5, 2 * self.distance
+        f = 1 / np.tan(np.radians(self.field_of_view) / 2)
+        depth, shift = (far + near) / (near - far), 2 * far * near / (near - far)
+        P = np.array([[f, 0, 0, 0], [0, f, 0, 0], [0, 0, depth, shift], [0, 0, -1, 0]])
+        return [float(x) for x in P.T.ravel()]
+
+
+#: The four views of the paper: from the top (+y up in the picture), then three sides, from +x, +y and -x, raised a
+#: little. Together they see all but the bottom and the side towards -y.
+VIEWS: tuple[Camera, ...] = (Camera(-90, 90), Camera(0, 15), Camera(90, 15), Camera(180, 15))
+
+
+@dataclass(frozen=True, slots=True)
+class Style:
+    """How pictures look, and how much chance varies that. Ranges are (least, most), drawn uniformly.
+
+    Attributes:
+        light_azimuth, light_elevation: degrees, where the light stands.
+        ambient, diffuse, specular: coefficients of the renderer's (Phong) light model.
+        shadow: chance that a picture has cast shadows (they take four times as long).
+        azimuth, elevation: degrees that each camera may turn or rise, either way.
+        distance: share that each camera may come nearer or go farther.
+        hue: share of the colour circle that each part's colour may shift, either way.
+        brightness: share that each part's colour may become darker or brighter.
+        noise: standard deviation of pixel noise, in grey levels of 255.
+    """
+
+    light_azimuth: tuple[float, float] = (40.0, 40.0)
+    light_elevation: tuple[float, float] = (55.0, 55.0)
+    ambient: tuple[float, float] = (0.65, 0.65)
+    diffuse: tuple[float, float] = (0.35, 0.35)
+    specular: tuple[float, float] = (0.0, 0.0)
+    shadow: float = 0.0
+    azimuth: float = 0.0
+    elevation: float = 0.0
+    distance: float = 0.0
+    hue: float = 0.0
+    brightness: float = 0.0
+    noise: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def is_random(self) -> bool:
+        """Whether two pictures of one assembly may differ."""
+        return self != Style(
+            (self.light_azimuth[0],) * 2,
+            (self.light_elevation[0],) * 2,
+            (self.ambient[0],) * 2,
+            (self.diffuse[0],) * 2,
+            (self.specular[0],) * 2,
+            round(self.shadow),
+        )
+
+
+STYLES: Mapping[str, Style] = {
+    "clean": Style(),
+    "varied": Style(
+        light_azimuth=(0.0, 360.0),
+        light_elevation=(25.0, 75.0),
+        ambient=(0.45, 0.65),
+        diffuse=(0.3, 0.55),
+        specular=(0.0, 0.2),
+        shadow=0.25,
+        azimuth=5.0,
+        elevation=4.0,
+        distance=0.05,
+        hue=0.025,
+        brightness=0.15,
+        noise=(0.0, 8.0),
+    ),
+}
+
+
+def style_named(style: str | Style) -> Style:
+    """A style by its name, or as it is.
+
+    Raises:
+        UnknownNameError: no style of that name.
+    """
+    if isinstance(style, Style):
+        return style
+    if style not in STYLES:
+        raise UnknownNameError("style of pictures", style, STYLES)
+    return STYLES[style]
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """One drawing of a style: everything that chance decides about one picture, but its noise."""
+
+    cameras: tuple[Camera, ...]
+    light: tuple[float, float, float]
+    ambient: float
+    diffuse: float
+    specular: float
+    shadow: bool
+    colours: Array
+    noise: float
+
+
+def draw_look(style: Style, cameras: Sequence[Camera], colours: Array, rng: np.random.Generator) -> Look:
+    """Draw a look; how many numbers are drawn depends on the counts of cameras and colours only.
+
+    Args:
+        style: what may vary.
+        cameras: the cameras to start from.
+        colours: float64 (n_parts, 3), RGB in 0..1.
+        rng: the only source of chance.
+    """
+    azimuth, elevation = np.radians([rng.uniform(*style.light_azimuth), rng.uniform(*style.light_elevation)])
+    direction = (np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation))
+    turned = tuple(
+        replace(
+            camera,
+            azimuth=camera.azimuth + style.azimuth * rng.uniform(-1, 1),
+            elevation=camera.elevation + style.elevation * rng.uniform(-1, 1),
+            distance=camera.distance * (1 + style.distance * rng.uniform(-1, 1)),
+        )
+        for camera in cameras
+    )
+    ambient, diffuse, specular = (rng.uniform(*r) for r in (style.ambient, style.diffuse, style.specular))
+    shadow, noise = bool(rng.random() < style.shadow), float(rng.uniform(*style.noise))
+    shifted = []
+    for rgb, hue, value in zip(colours, rng.uniform(-1, 1, len(colours)), rng.uniform(-1, 1, len(colours))):
+        h, s, v = colorsys.rgb_to_hsv(*(float(x) for x in rgb))
+        bright = min(1.0, v * (1 + style.brightness * value))
+        shifted.append(colorsys.hsv_to_rgb((h + style.hue * hue) % 1.0, s, bright))
+    x, y, z = (float(10 * x) for x in direction)
+    return Look(turned, (x, y, z), ambient, diffuse, specular, shadow, np.array(shifted), noise)
+
+
+@dataclass(frozen=True)
+class Scene:
+    """An assembly as arrays, in the cameras' frame: middle at the origin, largest extent from -1 to 1.
+
+    Attributes:
+        position: float64 (n_bodies, 3).
+        turn: float64 (n_bodies, 4), quaternions (x, y, z, w).
+        half: float64 (n_bodies, 3), half edges of a box, or its scale where a body has corners of its own.
+        meshes: for bodies that are not boxes, number -> corners (n, 3) and triangles (m, 3), before `half` scales them.
+        owner: int64 (n_bodies,), which part a body belongs to.
+        colours: float64 (n_parts, 3), RGB in 0..1.
+    """
+
+    position: Array
+    turn: Array
+    half: Array
+    meshes: Mapping[int, tuple[Array, NDArray[np.int64]]]
+    owner: NDArray[np.int64]
+    colours: Array
+
+    @cached_property
+    def shapes(self) -> tuple[tuple[object, ...], ...]:
+        """What each body looks like, apart from pose and colour: equal entries share a shape."""
+        return tuple(
+            (*np.round(half, 9).tolist(), *(m.tobytes() for m in self.meshes.get(i, ())))
+            for i, half in enumerate(self.half)
+        )
+
+    @cached_property
+    def digest(self) -> bytes:
+        """SHA-256 of everything that decides the pictures."""
+        found = hashlib.sha256(repr(sorted(self.meshes)).encode())
+        # Rounded, so that poses that differ by what a rotation's arithmetic leaves behind are one.
+        for array in (self.position, self.turn, self.half, self.owner, self.colours):
+            found.update((np.round(array, 9) + 0.0).tobytes())
+        for i in sorted(self.meshes):
+            found.update(b"".join(np.ascontiguousarray(m).tobytes() for m in self.meshes[i]))
+        return found.digest()
+
+
+def scene_of(assembly: Assembly, colours: Mapping[str, RGB] | None = None) -> Scene:
+    """An assembly as the cameras see it.
+
+    Args:
+        assembly: the parts, in the world.
+        colours: part name -> RGB in 0..1; parts without one take the palette's, by their place in the assembly.
+
+    Raises:
+        InputError: a colour that is not three numbers in 0..1.
+        UnknownNameError: a colour for a part that is not there.
+    """
+    given = dict(colours or {})
+    if unknown := set(given) - set(assembly.names):
+        raise UnknownNameError("part", min(unknown), assembly.names)
+    chosen = [_checked(name, given.get(name, palette_colour(i))) for i, name in enumerate(assembly.names)]
+    poses, shapes = assembly.X_WB, [body.shape for body in assembly.bodies]
+    half = np.array([shape.size / 2 if isinstance(shape, Box) else np.ones(3) for shape in shapes])
+    meshes = {i: (s.vertices, s.faces) for i, s in enumerate(shapes) if not isinstance(s, Box)}
+    R, centre = poses[:, :3, :3], poses[:, :3, 3]
+    reach = np.einsum("nij,nj->ni", np.abs(R), half)
+    low, high = centre - reach, centre + reach
+    for i, (vertices, _) in meshes.items():
+        corners = vertices @ R[i].T + centre[i]
+        low[i], high[i] = corners.min(axis=0), corners.max(axis=0)
+    bottom, top = low.min(axis=0), high.max(axis=0)
+    scale = 2 / float((top - bottom).max())
+    position = (centre - (bottom + top) / 2) * scale
+    turn = Rotation.from_matrix(R).as_quat()
+    return Scene(position, turn, half * scale, meshes, assembly.owners, np.array(chosen))
+
+
+def palette_colour(i: int) -> RGB:
+    """The colour of part number `i`: the palette's, then lighter, then darker, and so on."""
+    base, turn = np.array(PALETTE[i % len(PALETTE)]), i // len(PALETTE)
+    amount = 1 - 0.6 ** ((turn + 1) // 2)
+    r, g, b = base + (1 - base) * amount if turn % 2 else base * (1 - amount)
+    return float(r), float(g), float(b)
+
+
+def _checked(name: str, colour: Sequence[float]) -> RGB:
+    if len(colour) != 3 or not all(0.0 <= float(x) <= 1.0 for x in colour):
+        raise InputError(f"Expected the colour of {name!r} as RGB, three numbers from 0 to 1; got {colour!r}.")
+    r, g, b = (float(x) for x in colour)
+    return r, g, b

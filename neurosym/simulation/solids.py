@@ -1,0 +1,168 @@
+"""From an assembly to what a rigid-body simulator wants: convex pieces, masses, centres and true inertia.
+
+Bullet takes the inertia of a compound from its bounding box unless it is told otherwise, and it trusts bodies of about
+one unit more than small ones. So a `RigidBody` carries its own mass properties, its frame lies at the centre of mass
+along the principal axes, and the whole scene is scaled until a typical body measures one unit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from neurosym.errors import InputError
+from neurosym.geometry.assembly import Assembly, Body, Box, Part
+
+Array = NDArray[np.float64]
+BodiesKind = Literal["parts", "cubes"]
+
+
+@dataclass(frozen=True, slots=True)
+class Solid:
+    """One convex piece in the scene's frame and scale.
+
+    Attributes:
+        X_WB: float64 (4, 4), pose of the piece.
+        half: float64 (3,), half edge lengths of a box; None for a convex hull.
+        vertices: float64 (n, 3), corners in the piece's own frame.
+        volume: its volume.
+        centre: float64 (3,), centre of mass in the scene.
+        inertia: float64 (3, 3), about `centre`, axes of the scene, for density one.
+    """
+
+    X_WB: Array
+    half: Array | None
+    vertices: Array
+    volume: float
+    centre: Array
+    inertia: Array
+
+    @property
+    def corners(self) -> Array:
+        """float64 (n, 3), corners in the scene."""
+        return np.asarray(self.vertices @ self.X_WB[:3, :3].T + self.X_WB[:3, 3])
+
+
+@dataclass(frozen=True, slots=True)
+class RigidBody:
+    """What moves as one: a part, or a single piece of it.
+
+    Attributes:
+        part: name of the part it belongs to.
+        index: which piece of the part, 0 where a part is one body.
+        solids: its convex pieces.
+        mass: mass (unit of the scene: the densest part has density one).
+        X_WC: float64 (4, 4), frame at the centre of mass along the principal axes.
+        inertia: float64 (3,), principal moments in that frame.
+    """
+
+    part: str
+    index: int
+    solids: tuple[Solid, ...]
+    mass: float
+    X_WC: Array
+    inertia: Array
+
+    @property
+    def corners_C(self) -> Array:
+        """float64 (n, 3), corners in the body's own frame."""
+        return np.concatenate([(s.corners - self.X_WC[:3, 3]) @ self.X_WC[:3, :3] for s in self.solids])
+
+
+def typical_extent(assembly: Assembly) -> float:
+    """The length that tolerances are counted in: the median edge of the bodies' bounding boxes.
+
+    For a body that is the geometric mean of its three extents, so that for cubes it is the cube's edge, exactly.
+    """
+    extents = [np.ptp(body.shape.vertices, axis=0) for body in assembly.bodies]
+    return float(np.median([np.cbrt(np.prod(e)) for e in extents]))
+
+
+def rigid_bodies(assembly: Assembly, kind: BodiesKind, scale: float) -> tuple[RigidBody, ...]:
+    """The bodies that a simulation of `assembly` moves, lengths multiplied by `scale`.
+
+    Args:
+        assembly: parts in the world.
+        kind: ``"parts"``: each part is one rigid compound; ``"cubes"``: each piece of it is a body of its own.
+        scale: scene lengths per length unit of the assembly.
+
+    Raises:
+        InputError: `kind` is neither, or a part has a mesh that is not convex.
+    """
+    if kind not in ("parts", "cubes"):
+        raise InputError(f"Expected bodies='parts' or bodies='cubes'; got {kind!r}.")
+    heaviest = max(part.density for part in assembly.parts)
+    made = []
+    for part in assembly.parts:
+        solids = [_solid(part, body, scale) for body in part.bodies]
+        groups: Sequence[Sequence[Solid]] = [solids] if kind == "parts" else [[solid] for solid in solids]
+        made += [_join(part.name, i, group, part.density / heaviest) for i, group in enumerate(groups)]
+    return tuple(made)
+
+
+def _solid(part: Part, body: Body, scale: float) -> Solid:
+    X_WB = np.array(part.X_WP @ body.X_PB, dtype=np.float64)
+    X_WB[:3, 3] *= scale
+    corners = body.shape.vertices * scale
+    half: Array | None = None
+    if isinstance(body.shape, Box):
+        half = body.shape.size * scale / 2
+        # Solid cuboid: I_xx = m (b^2 + c^2) / 12 with full edges, so a third of the squared halves.
+        moments = (np.sum(half**2) - half**2) / 3
+        volume, centre, inertia = float(8 * np.prod(half)), np.zeros(3), np.diag(moments) * 8 * np.prod(half)
+    else:
+        volume, centre, inertia = _convex_properties(part.name, corners, body.shape.faces)
+    R = X_WB[:3, :3]
+    return Solid(X_WB, half, corners, volume, R @ centre + X_WB[:3, 3], R @ inertia @ R.T)
+
+
+def _convex_properties(name: str, vertices: Array, faces: NDArray[np.int64]) -> tuple[float, Array, Array]:
+    """Volume, centre and inertia (density one) of a closed convex mesh, in its own frame."""
+    import trimesh
+
+    mesh = trimesh.Trimesh(vertices, faces, process=True)
+    hull = mesh.convex_hull
+    # Bullet would silently fill the hollows: a bowl would become a disc. 1e-3: CAD facets are rarely exactly convex.
+    if abs(mesh.volume) < (1 - 1e-3) * hull.volume:
+        raise InputError(
+            f"Expected part {name!r} as boxes or convex pieces, which is what a simulator can move; got a mesh that "
+            f"fills {abs(mesh.volume) / hull.volume:.0%} of its convex hull. Give the part as several Convex bodies."
+        )
+    return float(hull.volume), np.asarray(hull.center_mass), np.asarray(hull.moment_inertia)
+
+
+def _join(name: str, index: int, solids: Sequence[Solid], density: float) -> RigidBody:
+    volume = sum(solid.volume for solid in solids)
+    centre = sum((solid.volume * solid.centre for solid in solids), np.zeros(3)) / volume
+    inertia = np.zeros((3, 3))
+    for solid in solids:
+        r = solid.centre - centre
+        inertia += solid.inertia + solid.volume * (r @ r * np.eye(3) - np.outer(r, r))  # parallel axes
+    if len(solids) == 1 and solids[0].half is not None:
+        # A box keeps its own axes: eigenvectors of a cube's inertia are arbitrary.
+        R = solids[0].X_WB[:3, :3]
+        moments = np.diag(R.T @ inertia @ R)
+    else:
+        moments, R = np.linalg.eigh(inertia)
+        R = R * np.sign(np.linalg.det(R))
+    X_WC = np.eye(4)
+    X_WC[:3, :3], X_WC[:3, 3] = R, centre
+    return RigidBody(name, index, tuple(solids), density * volume, X_WC, density * moments)
+
+
+def quaternion(R: Array) -> Array:
+    """Rotation matrix (3, 3) to a unit quaternion (x, y, z, w)."""
+    return np.asarray(Rotation.from_matrix(R).as_quat())
+
+
+def matrix(position: Sequence[float] | Array, quaternion_xyzw: Sequence[float] | Array) -> Array:
+    """Position and quaternion (x, y, z, w) to a pose, float64 (4, 4)."""
+    X = np.eye(4)
+    X[:3, :3] = Rotation.from_quat(quaternion_xyzw).as_matrix()
+    X[:3, 3] = position
+    return X
