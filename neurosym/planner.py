@@ -11,7 +11,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any, ClassVar, Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 
@@ -173,6 +173,12 @@ class SearchLog(Generic[S]):
             self.best_prefix = (*prefix, action)
         return answer
 
+    def refuse(self, prefix: tuple[int, ...], action: int, reason: str) -> None:
+        """Note a guess that failed without asking the oracle (not a candidate): an iteration, no attempt."""
+        self.iterations += 1
+        if len(self._refusals) < MAX_BLAME:
+            self._refusals.append((prefix, action, Rejection(reason)))
+
     def names(self, actions: Sequence[int]) -> tuple[str, ...]:
         return tuple(self.problem.actions[a] for a in actions)
 
@@ -219,7 +225,8 @@ class SearchLog(Generic[S]):
 class Planner(ABC):
     """A planner: one method, and an honest declaration of what it can do."""
 
-    traits: ClassVar[PlannerTraits]
+    #: Usually set on the class; an instance may set its own where an option changes what can be claimed.
+    traits: PlannerTraits
 
     @abstractmethod
     def plan(
