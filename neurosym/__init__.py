@@ -1,1 +1,147 @@
+"""neurosym: plan in which order things go together or come apart.
 
+Symbols say what an action needs and changes; geometry answers whether it is physically possible; a prior,
+learned from pictures of finished work, says what to try first::
+
+    import neurosym as ns
+
+    problem = ns.load_domain("soma").problem(17)
+    guided = ns.solve(problem, planner="best-first", prior="sinkhorn")
+    print(guided.plan, guided.iterations)
+
+Public names are resolved when first used: importing this package loads no heavy dependency.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+__version__ = "0.1.0"
+
+_HOMES = {
+    "neurosym.errors": (
+        "AssemblyError",
+        "CheckpointError",
+        "ContractError",
+        "DefinitionError",
+        "DemonstrationError",
+        "InputError",
+        "MissingDependencyError",
+        "NeurosymError",
+        "UnknownNameError",
+    ),
+    "neurosym.demonstrations": ("Demonstrations",),
+    "neurosym.family": ("ProblemFamily",),
+    "neurosym.geometry.assembly": ("Assembly",),
+    "neurosym.language": (
+        "Action",
+        "Atom",
+        "Derived",
+        "Domain",
+        "Fluent",
+        "GroundProblem",
+        "Problem",
+        "State",
+        "Type",
+        "derived",
+    ),
+    "neurosym.pipeline": ("count_plans", "solve"),
+    "neurosym.planner": ("Budget", "Planner", "PlannerTraits", "PlanResult", "Refusal", "SearchLog", "Status"),
+    "neurosym.prior": ("OrderScores", "Prior", "RandomPrior", "UniformPrior"),
+    "neurosym.problem": ("Rejection", "SearchProblem", "Step", "Verdict"),
+    "neurosym.registry": (
+        "domain_names",
+        "load_domain",
+        "load_planner",
+        "load_prior",
+        "planner_names",
+        "prior_names",
+    ),
+    "neurosym.validation": ("Validation", "validate"),
+}
+_HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
+_MODULES = ("predicates",)
+
+__all__ = sorted([*_HOME_OF, *_MODULES, "__version__"])
+
+if TYPE_CHECKING:
+    from neurosym import predicates as predicates
+    from neurosym.demonstrations import Demonstrations as Demonstrations
+    from neurosym.errors import (
+        AssemblyError as AssemblyError,
+    )
+    from neurosym.errors import (
+        CheckpointError as CheckpointError,
+    )
+    from neurosym.errors import (
+        ContractError as ContractError,
+    )
+    from neurosym.errors import (
+        DefinitionError as DefinitionError,
+    )
+    from neurosym.errors import (
+        DemonstrationError as DemonstrationError,
+    )
+    from neurosym.errors import (
+        InputError as InputError,
+    )
+    from neurosym.errors import (
+        MissingDependencyError as MissingDependencyError,
+    )
+    from neurosym.errors import (
+        NeurosymError as NeurosymError,
+    )
+    from neurosym.errors import (
+        UnknownNameError as UnknownNameError,
+    )
+    from neurosym.family import ProblemFamily as ProblemFamily
+    from neurosym.geometry.assembly import Assembly as Assembly
+    from neurosym.language import Action as Action
+    from neurosym.language import Atom as Atom
+    from neurosym.language import Derived as Derived
+    from neurosym.language import Domain as Domain
+    from neurosym.language import Fluent as Fluent
+    from neurosym.language import GroundProblem as GroundProblem
+    from neurosym.language import Problem as Problem
+    from neurosym.language import State as State
+    from neurosym.language import Type as Type
+    from neurosym.language import derived as derived
+    from neurosym.pipeline import count_plans as count_plans
+    from neurosym.pipeline import solve as solve
+    from neurosym.planner import Budget as Budget
+    from neurosym.planner import Planner as Planner
+    from neurosym.planner import PlannerTraits as PlannerTraits
+    from neurosym.planner import PlanResult as PlanResult
+    from neurosym.planner import Refusal as Refusal
+    from neurosym.planner import SearchLog as SearchLog
+    from neurosym.planner import Status as Status
+    from neurosym.prior import OrderScores as OrderScores
+    from neurosym.prior import Prior as Prior
+    from neurosym.prior import RandomPrior as RandomPrior
+    from neurosym.prior import UniformPrior as UniformPrior
+    from neurosym.problem import Rejection as Rejection
+    from neurosym.problem import SearchProblem as SearchProblem
+    from neurosym.problem import Step as Step
+    from neurosym.problem import Verdict as Verdict
+    from neurosym.registry import domain_names as domain_names
+    from neurosym.registry import load_domain as load_domain
+    from neurosym.registry import load_planner as load_planner
+    from neurosym.registry import load_prior as load_prior
+    from neurosym.registry import planner_names as planner_names
+    from neurosym.registry import prior_names as prior_names
+    from neurosym.validation import Validation as Validation
+    from neurosym.validation import validate as validate
+
+
+def __getattr__(name: str) -> Any:
+    """Import what is asked for, when it is asked for (PEP 562)."""
+    if name in _HOME_OF:
+        return getattr(importlib.import_module(_HOME_OF[name]), name)
+    if name in _MODULES:
+        return importlib.import_module(f"neurosym.{name}")
+    raise AttributeError(f"module 'neurosym' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return list(__all__)

@@ -6,10 +6,10 @@ Frames are named as Drake does: ``X_WP`` is the pose of part P in the world W, a
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from neurosym.geometry.stability import Stability
 
 Array = NDArray[np.float64]
+T = TypeVar("T")
 
 #: Corners of a unit box about the origin, and its twelve triangles with outward normals.
 _CORNERS = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
@@ -302,25 +303,26 @@ class Assembly:
         """Where bodies touch one another and the table: points, normals, areas."""
         from neurosym.geometry.contacts import find_contacts
 
-        return self._once("contacts", lambda: find_contacts(self))
+        return self.remember("contacts", lambda: find_contacts(self))
 
     def blocking(self, directions: ArrayLike | None = None) -> BlockingGraph:
         """What stands in the way of what, per direction, float64 (k, 3); default `axes`."""
         from neurosym.geometry.blocking import BlockingGraph
 
         chosen = self.axes if directions is None else np.atleast_2d(np.asarray(directions, dtype=np.float64))
-        return self._once(f"blocking {chosen.tobytes().hex()}", lambda: BlockingGraph(self, chosen))
+        return self.remember(f"blocking {chosen.tobytes().hex()}", lambda: BlockingGraph(self, chosen))
 
     def stability(self) -> Stability:
         """Which subsets of the parts stand still under gravity."""
         from neurosym.geometry.stability import Stability
 
-        return self._once("stability", lambda: Stability(self))
+        return self.remember("stability", lambda: Stability(self))
 
-    def _once(self, key: str, make: Any) -> Any:
+    def remember(self, key: str, make: Callable[[], T]) -> T:
+        """What `make` gives, computed once for this assembly and kept under `key`."""
         if key not in self._cache:
             self._cache[key] = make()
-        return self._cache[key]
+        return cast(T, self._cache[key])
 
     def __getstate__(self) -> dict[str, Any]:
         """Copies sent to other processes leave the remembered answers behind: FCL's objects cannot travel."""

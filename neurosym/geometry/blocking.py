@@ -42,6 +42,7 @@ class BlockingGraph:
             raise InputError(f"Expected directions as non-zero vectors of shape (k, 3); got {directions.tolist()}.")
         self.assembly = assembly
         self.directions = directions / lengths[:, None]
+        self.vectors = [tuple(map(float, d)) for d in self.directions]
         self.names = assembly.names
         self.into_table = self.directions[:, 2] < -assembly.tolerances.parallel
         self.queries = 0

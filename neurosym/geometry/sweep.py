@@ -91,6 +91,22 @@ def _shadows(triangles: Array, touch: float) -> tuple[Array, Array]:
     return kept, np.linalg.solve(matrix, kept[..., 2][..., None])[..., 0]
 
 
+def drops_onto(assembly: Assembly, body: int, other: int, X_WO: Array) -> bool:
+    """Whether an upright box, falling, would land on box `other` at pose X_WO (4, 4)."""
+    shape, target = assembly.bodies[body].shape, assembly.bodies[other].shape
+    assert isinstance(shape, Box)
+    assert isinstance(target, Box)
+    pose = assembly.X_WB[body].copy()
+    size = shape.size - 2 * assembly.touch
+    axis = int(np.argmax(np.abs(pose[2, :3])))
+    drop = float(pose[2, 3] - X_WO[2, 3]) + assembly.smallest_extent
+    if drop <= 0:
+        return False
+    size[axis] += drop
+    pose[2, 3] -= drop / 2
+    return collision.collide(collision.box_object(size, pose), collision.box_object(target.size, X_WO))
+
+
 def exits_along(assembly: Assembly, part: int, direction: Array, others: list[int]) -> list[int]:
     """Which of `others` (numbers of parts) a part hits on its way out along a direction, asked afresh.
 

@@ -31,10 +31,12 @@ class Simulation:
     Attributes:
         bodies: ``"cubes"`` (every unit cube by itself, the paper's rule) or ``"rigid"`` (every part one body).
         removes: name of an action -> name of the part that it takes away.
+        absent: parts of the world that are gone when the problem begins.
     """
 
     bodies: str
     removes: Mapping[str, str]
+    absent: tuple[str, ...] = ()
 
 
 class Domain:

@@ -1,0 +1,173 @@
+"""When does taking a piece out of a stack of unit cubes bring others down? Three rules, as derived predicates.
+
+``cubes``   Burke, Subr, Ramamoorthy (RA-L 2021), Sec. IV-D: unit cubes are independent bodies, a piece is
+            deleted, and a collapse is MORE THAN ONE cube moving. One cube that falls alone is no collapse; it
+            settles down on what is under it.
+``strict``  nothing may be left over a removed cube.
+``rigid``   pieces are rigid bodies: one must leave along a straight line that the others and the table leave
+            free, and the rest must stand (`neurosym.predicates.free`, `stable_without`).
+
+The first two stand on the blocking graph of the cubes' boxes in the direction down: cube b is over cube a when
+b, moved down, would hit a. Falling keeps every column's order and leaves no gap in it, so the set of pieces
+left decides where every cube lies.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from neurosym.errors import AssemblyError
+from neurosym.geometry.assembly import Assembly, Box
+from neurosym.geometry.blocking import bits
+from neurosym.geometry.sweep import drops_onto
+from neurosym.language import Derived, Fluent, State
+from neurosym.problem import Verdict
+
+RULES = ("cubes", "strict", "rigid")
+
+#: Moving cubes that are still no collapse (the paper: "any", by its code more than one).
+MAY_MOVE = {"cubes": 1, "strict": 0}
+
+_DOWN = np.array([[0.0, 0.0, -1.0]])
+
+
+@dataclass(frozen=True)
+class Stacks:
+    """Which cubes stand over which, as bitsets.
+
+    Attributes:
+        own: one bitset of cubes a piece: its own.
+        over: one bitset of cubes a piece: all cubes of other pieces over any of its own.
+        owner: the number of the piece of each cube.
+    """
+
+    own: tuple[int, ...]
+    over: tuple[int, ...]
+    owner: tuple[int, ...]
+    _cubes: dict[int, int] = field(default_factory=dict, repr=False)
+
+    @classmethod
+    def of(cls, world: Assembly) -> Stacks:
+        """The stacks of an assembly of cubes; computed once for it."""
+        return world.remember("stacks", lambda: cls._find(world))
+
+    @classmethod
+    def _find(cls, world: Assembly) -> Stacks:
+        below = world.blocking(_DOWN).by_body[0]
+        own, over = [0] * len(world), [0] * len(world)
+        for cube, owner in enumerate(world.owners):
+            own[owner] |= 1 << cube
+            for other in bits(below[cube]):
+                over[world.owners[other]] |= 1 << cube
+        return cls(tuple(own), tuple(o & ~m for o, m in zip(over, own)), tuple(map(int, world.owners)))
+
+
+    def cubes_of(self, pieces: int) -> int:
+        """All cubes of the pieces in a bitset; each set is gathered once."""
+        cubes = self._cubes.get(pieces)
+        if cubes is None:
+            cubes = 0
+            for piece in bits(pieces):
+                cubes |= self.own[piece]
+            self._cubes[pieces] = cubes
+        return cubes
+
+
+def keeps_standing(present: Fluent, rule: str) -> Derived:
+    """``keeps_standing(p)``: at most `MAY_MOVE` cubes move when piece p is deleted."""
+    limit = MAY_MOVE[rule]
+
+    def keeps_standing(world: Assembly, state: State, p: str) -> Verdict:
+        number = world.index[p]
+        there = state.mask(present, world.names) & ~(1 << number)
+        if world.keeps_answers:
+            stacks = Stacks.of(world)
+            moving = stacks.over[number] & stacks.cubes_of(there)
+        else:
+            moving = _falling(world, there, number)
+        return _STANDS if moving.bit_count() <= limit else collapse(world, number, moving)
+
+    def collapse(world: Assembly, number: int, moving: int) -> Verdict:
+        owners = [int(world.owners[cube]) for cube in bits(moving)]
+        names = tuple(world.names[i] for i in sorted(set(owners)))
+        # As long as any limit + 1 of these cubes are there, they move; the fewest pieces that own so many.
+        counts = sorted(Counter(owners).items(), key=lambda item: -item[1])
+        until, cubes = [], 0
+        for owner, count in counts:
+            until.append(present(world.names[owner]))
+            cubes += count
+            if cubes > limit:
+                break
+        falling = f"{len(owners)} cube{'s' * (len(owners) > 1)} of {', '.join(names)}"
+        said = f"Without {world.names[number]}, {falling} would {_WORD[rule]}."
+        return Verdict(False, names, said, tuple(until))
+
+    return Derived("keeps_standing", present.types, keeps_standing)
+
+
+_STANDS = Verdict(True)
+_WORD = {"cubes": "fall", "strict": "be left over it"}
+
+
+def _falling(world: Assembly, there: int, removed: int) -> int:
+    """Asked afresh: settle the cubes with and without piece `removed`, and see which come to lie lower."""
+    with_it = _settled(world, there | 1 << removed)
+    without = _settled(world, there)
+    return sum(1 << cube for cube, z in without.items() if with_it[cube] - z > world.smallest_extent / 2)
+
+
+def _settled(world: Assembly, there: int) -> dict[int, float]:
+    """Heights (z of the centre) at which the cubes of the pieces in `there` come to rest, lowest first."""
+    edge = world.smallest_extent
+    cubes = [int(c) for c in np.argsort(world.X_WB[:, 2, 3], kind="stable") if there >> int(world.owners[c]) & 1]
+    poses: dict[int, NDArray[np.float64]] = {}
+    for cube in cubes:
+        pose = world.X_WB[cube].copy()
+        under = [poses[c] for c in poses if drops_onto(world, cube, c, poses[c])]
+        top = max((p[2, 3] + edge / 2 for p in under), default=world.ground)
+        pose[2, 3] = top + edge / 2
+        poses[cube] = pose
+    return {cube: float(pose[2, 3]) for cube, pose in poses.items()}
+
+
+def check_cubes(world: Assembly, rule: str) -> None:
+    """Refuse what the rules `cubes` and `strict` cannot judge: anything but equal upright cubes."""
+    advice = f"The rule {rule!r} judges unit cubes; use collapse='rigid' for other shapes."
+    if not world.all_boxes:
+        odd = next(p.name for p in world.parts if not all(isinstance(b.shape, Box) for b in p.bodies))
+        raise AssemblyError(f"Expected pieces made of equal cubes; {odd!r} is not. {advice}")
+    sizes = np.array([b.shape.size for b in world.bodies if isinstance(b.shape, Box)])
+    if np.ptp(sizes) > 0.01 * sizes.min():
+        raise AssemblyError(f"Expected cubes of one size; got edges from {sizes.min():g} to {sizes.max():g}. {advice}")
+    vertical = np.abs(world.X_WB[:, 2, :3]).max(axis=1)
+    if vertical.min() < 1 - 1e-6:
+        raise AssemblyError(f"Expected upright cubes, an axis of each along z; some are tilted. {advice}")
+
+
+def check_standing(world: Assembly, rule: str) -> None:
+    """Refuse an assembly that floats: a piece (under `cubes` any cube) with nothing under it."""
+    if rule == "cubes":
+        # A cube may stand on its own piece: the rule takes the pieces' cubes for independent.
+        for cube, z in _settled(world, (1 << len(world)) - 1).items():
+            if world.X_WB[cube, 2, 3] - z > world.smallest_extent / 2:
+                at = ", ".join(f"{v:.3g}" for v in world.X_WB[cube, :3, 3])
+                raise AssemblyError(
+                    f"Piece {world.names[world.owners[cube]]!r}: its cube at ({at}) is floating. Under the rule 'cubes' "
+                    "every cube is a body of its own and would fall at once; use collapse='rigid' or 'strict'."
+                )
+    carried: set[int] = set()
+    for contact in world.contacts():
+        if contact.normal[2] < -0.7:
+            carried.add(int(world.owners[contact.a]))
+        elif contact.normal[2] > 0.7:
+            carried.add(int(world.owners[contact.b]))
+    for number, name in enumerate(world.names):
+        if number not in carried:
+            raise AssemblyError(
+                f"Piece {name!r} is floating: it stands neither on another piece nor on the table (z is up, the table is "
+                f"at z = {world.ground:g}). Move it down, or leave it out."
+            )

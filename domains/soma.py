@@ -1,0 +1,232 @@
+"""The Soma cube: take a puzzle of polycubes apart, piece by piece, so that nothing collapses.
+
+Source: Burke, Subr, Ramamoorthy, "Action sequencing using visual permutations" (RA-L 2021), Sec. IV-D and
+Table II. The rules of collapse are in `domains.collapse`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from domains.collapse import RULES, check_cubes, check_standing, keeps_standing
+from domains.soma_pieces import LETTERS, Cell, solutions
+from neurosym import predicates
+from neurosym.demonstrations import Demonstrations
+from neurosym.errors import AssemblyError, InputError, UnknownNameError
+from neurosym.family import ProblemFamily, Progress
+from neurosym.geometry.assembly import Assembly
+from neurosym.language import Action, Domain, Fluent, Problem, Simulation, Type
+
+piece = Type("piece")
+present = Fluent("present", piece)
+_p = piece("p")
+
+
+def _take_apart(rule: str) -> Domain:
+    geometry = (
+        [predicates.free(present)(_p), predicates.stable_without(present)(_p)]
+        if rule == "rigid"
+        else [keeps_standing(present, rule)(_p)]
+    )
+    remove = Action("remove", _p, pre=[present(_p), *geometry], eff=[~present(_p)], label="{p}")
+    return Domain(f"soma-{rule}", fluents=[present], actions=[remove])
+
+
+#: One symbolic domain a rule of collapse.
+DOMAINS: dict[str, Domain] = {rule: _take_apart(rule) for rule in RULES}
+
+#: Numbers of `problems("train")` in a split: half of the 240, as in the paper.
+N_TRAIN = 120
+
+#: Kept apart from any user's seed, so that a split never repeats the draws of a search.
+_SPLIT_STREAM = 0x50_4D_41
+
+
+class SomaFamily(ProblemFamily):
+    """The 240 Soma cubes, and any polycube puzzle a user brings."""
+
+    name = "soma"
+    reference = "Burke, Subr, Ramamoorthy (RA-L 2021), Sec. IV-D, Table II; Berlekamp, Conway, Guy, Winning Ways"
+    domain = DOMAINS["cubes"]
+    published: ClassVar[Sequence[Mapping[str, Any]]] = (
+        {"planner": "swap-repair", "prior": "random", "initial_failures": None, "iterations": (5.35, 4.12)},
+        {"planner": "swap-repair", "prior": "tcn-paper", "initial_failures": (54.95, 10.99), "iterations": (1.90, 3.25)},
+        {
+            "planner": "swap-repair",
+            "prior": "sinkhorn-paper",
+            "initial_failures": (51.55, 6.19),
+            "iterations": (1.75, 3.19),
+        },
+    )
+    #: Rules of collapse, for the command line.
+    collapses = RULES
+
+    def solutions(self) -> tuple[dict[str, tuple[Cell, ...]], ...]:
+        """The 240 cubes, each {letter: cells}."""
+        return solutions()
+
+    def problem(
+        self,
+        number: int = 0,
+        *,
+        collapse: str = "cubes",
+        pictures: str = "clean",
+        seed: int = 0,
+        removed: Iterable[str] = (),
+        before: Iterable[tuple[str, str]] = (),
+    ) -> Problem:
+        """Cube number 0 to 239.
+
+        Args:
+            collapse: ``"cubes"`` (the paper's rule), ``"strict"`` or ``"rigid"``.
+            pictures: style of the observation, ``"clean"`` or ``"varied"``.
+            seed: of the pictures.
+            removed: letters of pieces that are gone already.
+            before: pairs of letters: the first must leave before the second.
+        """
+        cubes = solutions()
+        if isinstance(number, bool) or not isinstance(number, int | np.integer) or not 0 <= number < len(cubes):
+            raise InputError(f"Expected the number of a Soma cube, 0 to {len(cubes) - 1}; got {number!r}.")
+        return self.problem_from_cells(
+            cubes[number],
+            collapse=collapse,
+            pictures=pictures,
+            seed=[seed, int(number)],
+            removed=removed,
+            before=before,
+            name=f"soma-{number}",
+        )
+
+    def problem_from_cells(
+        self, cells: Mapping[str, Iterable[Sequence[int]]], *, collapse: str = "cubes", **options: Any
+    ) -> Problem:
+        """Any polycube puzzle, its pieces given as {name: [(x, y, z), ...]}, z up.
+
+        Raises:
+            AssemblyError: pieces that overlap, repeat a cell, are not connected, float or are empty.
+        """
+        if not isinstance(cells, Mapping) or not cells:
+            raise AssemblyError(f"Expected pieces as {{name: [(x, y, z), ...]}}, at least one; got {cells!r}.")
+        given = {str(name): [tuple(c) for c in own] for name, own in cells.items()}
+        assembly = Assembly.from_cells(given)
+        for name, own in given.items():
+            _check_connected(name, own)
+        return self.problem_from_assembly(assembly, collapse=collapse, **options)
+
+    def problem_from_assembly(
+        self,
+        assembly: Assembly,
+        *,
+        collapse: str = "cubes",
+        pictures: str = "clean",
+        seed: int | Sequence[int] = 0,
+        removed: Iterable[str] = (),
+        before: Iterable[tuple[str, str]] = (),
+        name: str = "puzzle",
+    ) -> Problem:
+        """A puzzle given as an assembly: cells or meshes, in any upright pose."""
+        if collapse not in DOMAINS:
+            raise UnknownNameError("collapse rule", collapse, DOMAINS)
+        gone = tuple(removed)
+        for letter in gone:
+            if letter not in assembly.names:
+                raise UnknownNameError("piece", letter, assembly.names)
+        if collapse != "rigid":
+            check_cubes(assembly, collapse)
+        check_standing(assembly, collapse)
+        bodies = {"cubes": "cubes", "rigid": "rigid"}.get(collapse)
+        simulation = Simulation(bodies, {n: n for n in assembly.names}, gone) if bodies else None
+
+        def observe() -> NDArray[np.uint8]:
+            return self._pictures(assembly, pictures, np.random.default_rng(seed))
+
+        return DOMAINS[collapse].problem(
+            world=assembly,
+            objects={piece: assembly.names},
+            init=[present(n) for n in assembly.names if n not in gone],
+            goal=[~present(n) for n in assembly.names],
+            before=before,
+            name=name,
+            family=self.name,
+            observe=observe,
+            simulation=simulation,
+            details={"collapse": collapse},
+        )
+
+    def numbers(self, part: str = "test", *, split: int = 0) -> tuple[int, ...]:
+        """Numbers of the cubes of a part: a random half each for ``"train"`` and ``"test"``; ``"all"`` is all."""
+        total = len(solutions())
+        if part == "all":
+            return tuple(range(total))
+        order = np.random.default_rng([_SPLIT_STREAM, split]).permutation(total)
+        halves = {"train": order[:N_TRAIN], "test": order[N_TRAIN:]}
+        if part not in halves:
+            raise UnknownNameError("part", part, ["all", *halves])
+        return tuple(sorted(map(int, halves[part])))
+
+    def problems(self, part: str = "test", *, split: int = 0, **options: Any) -> list[Problem]:
+        """The cubes of a part, with the options of `problem`."""
+        return [self.problem(n, **options) for n in self.numbers(part, split=split)]
+
+    def pictures(
+        self, problem: Problem, *, style: str = "clean", rng: np.random.Generator | None = None
+    ) -> NDArray[np.uint8]:
+        """Four views, top and three sides: uint8 (4, 64, 64, 3)."""
+        return self._pictures(problem.world, style, rng or np.random.default_rng(0))
+
+    def _pictures(self, assembly: Assembly, style: str, rng: np.random.Generator) -> NDArray[np.uint8]:
+        from neurosym.simulation.render import render_views
+
+        views: NDArray[np.uint8] = render_views(assembly, style=style, rng=rng)
+        return views
+
+    def demonstrations(
+        self,
+        part: str = "train",
+        *,
+        split: int = 0,
+        recipe: str = "full",
+        style: str = "clean",
+        seed: int = 0,
+        progress: Progress | None = None,
+    ) -> Demonstrations:
+        """Demonstrations for a training recipe: see `domains.soma_demonstrations`."""
+        from domains.soma_demonstrations import demonstrate
+
+        numbers = self.numbers(part, split=split)
+        return demonstrate(self, numbers, recipe=recipe, style=style, seed=seed, progress=progress)
+
+    def known_facts(self) -> dict[str, tuple[Any, Callable[[], Any]]]:
+        """Published or measured facts, with the functions that recompute them."""
+        return {
+            "cubes up to rotation and reflection": (240, lambda: len(solutions())),
+            "valid strict orders, all cubes; fewest; most": ((10_183, 6, 100), self._strict_orders),
+            "pieces": (("V", "L", "T", "Z", "A", "B", "P"), lambda: LETTERS),
+        }
+
+    def _strict_orders(self) -> tuple[int, int, int]:
+        from neurosym.pipeline import count_plans
+
+        counts = [count_plans(p) for p in self.problems("all", collapse="strict")]
+        return sum(counts), min(counts), max(counts)
+
+
+def _check_connected(name: str, cells: Sequence[tuple[int, ...]]) -> None:
+    left = {tuple(map(int, c)) for c in cells}
+    reached = [left.pop()]
+    while reached:
+        x, y, z = reached.pop()
+        steps = ((x + 1, y, z), (x - 1, y, z), (x, y + 1, z), (x, y - 1, z), (x, y, z + 1), (x, y, z - 1))
+        for neighbour in steps:
+            if neighbour in left:
+                left.remove(neighbour)
+                reached.append(neighbour)
+    if left:
+        raise AssemblyError(
+            f"Piece {name!r}: expected cells that hang together face to face; {sorted(left)} are apart from the rest. "
+            "Give each piece of the puzzle a name of its own."
+        )

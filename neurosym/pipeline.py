@@ -1,0 +1,138 @@
+"""`solve`: the whole flow on one page. Read this first."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from neurosym.errors import ContractError, InputError
+from neurosym.planner import Budget, Planner, PlanResult
+from neurosym.prior import OrderScores, Prior
+from neurosym.problem import SearchProblem
+from neurosym.registry import load_planner, load_prior
+from neurosym.validation import replay, validate
+
+if TYPE_CHECKING:
+    from neurosym.language.domain import Problem
+
+ORACLES = ("geometry", "physics")
+
+
+def solve(
+    problem: Problem,
+    *,
+    planner: str | Planner = "backtracking",
+    prior: str | Path | Prior | OrderScores | None = None,
+    budget: Budget | None = None,
+    rng: np.random.Generator | int | None = None,
+    oracle: str = "geometry",
+) -> PlanResult:
+    """Plan: ground the symbols, read the prior, search, and replay what was found.
+
+    Args:
+        problem: made by a domain, for instance ``ns.load_domain("soma").problem(17)``.
+        planner: a name or a planner.
+        prior: a name, a weights file, a prior, its scores, or None.
+        budget: when to stop.
+        rng: a generator or a seed; the same seed gives the same answer.
+        oracle: what answers attempts: ``"geometry"``, or ``"physics"``, a simulation in the loop.
+
+    Returns:
+        The result; no plan is a result, never an exception. Every plan was replayed: by `validate`, or for
+        physics in a fresh simulation.
+
+    Raises:
+        ContractError: the planner's plan does not survive its replay.
+    """
+    return plans(problem, k=None, planner=planner, prior=prior, budget=budget, rng=rng, oracle=oracle)[0]
+
+
+def plans(
+    problem: Problem,
+    *,
+    k: int | None = None,
+    planner: str | Planner = "best-first",
+    prior: str | Path | Prior | OrderScores | None = None,
+    budget: Budget | None = None,
+    rng: np.random.Generator | int | None = None,
+    oracle: str = "geometry",
+) -> list[PlanResult]:
+    """The k best plans, the likeliest first (planners whose traits say `k_best`); with None one, as `solve`."""
+    searcher = load_planner(planner)
+    if k is not None and not searcher.traits.k_best:
+        raise InputError(f"Expected a planner that gives several plans, best-first or exhaustive; got {planner!r}.")
+    if k is not None and k < 1:
+        raise InputError(f"Expected k of at least 1; got {k}.")
+    generator = rng if isinstance(rng, np.random.Generator) else np.random.default_rng(0 if rng is None else rng)
+    scores = advice(problem, prior)
+    with ExitStack() as stack:
+        search: SearchProblem[Any] = stack.enter_context(_oracle(problem, oracle))
+        if k is None:
+            results = [searcher.plan(search, scores, budget=budget, rng=generator)]
+        else:
+            results = searcher.plans(search, scores, k=k, budget=budget, rng=generator)  # type: ignore[attr-defined]
+    for result in results:
+        if result.plan is not None:
+            _check(problem, result.plan, oracle, planner)
+    return results
+
+
+def advice(problem: Problem, prior: str | Path | Prior | OrderScores | None) -> OrderScores | None:
+    """A prior's scores for the action primitives of a problem, in their order."""
+    if prior is None:
+        return None
+    scores = prior if isinstance(prior, OrderScores) else load_prior(prior).scores([problem])[0]
+    return scores.restricted(problem.actions) if scores.actions else scores
+
+
+def count_plans(problem: Problem) -> int:
+    """How many different orders solve a problem: exact, by dynamic programming over states."""
+    count: int = load_planner("exhaustive").count_plans(problem.ground())  # type: ignore[attr-defined]
+    return count
+
+
+class _Geometry:
+    """The grounded problem as a context, so that both oracles are opened and closed alike."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.search = problem.ground()
+
+    def __enter__(self) -> SearchProblem[Any]:
+        return self.search
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+
+def _oracle(problem: Problem, oracle: str) -> Any:
+    if oracle == "geometry":
+        return _Geometry(problem)
+    if oracle != "physics":
+        raise InputError(f"Expected an oracle, one of {', '.join(ORACLES)}; got {oracle!r}.")
+    rule = problem.simulation
+    if rule is None:
+        raise InputError(
+            f"Expected a problem that says how physics would judge it; {problem.name!r} does not "
+            "(for Soma: collapse='cubes' or 'rigid'). Use oracle='geometry'."
+        )
+    from neurosym.simulation.oracle import PhysicsOracle
+
+    removes = [rule.removes[name] for name in problem.actions]
+    return PhysicsOracle(problem.ground(), problem.world, removes=removes, bodies=rule.bodies, absent=rule.absent)
+
+
+def _check(problem: Problem, plan: Sequence[str], oracle: str, planner: object) -> None:
+    if oracle == "geometry":
+        found = validate(problem, plan)
+    else:
+        with _oracle(problem, oracle) as search:
+            found = replay(search, plan)
+    if not found.ok:
+        raise ContractError(
+            f"The planner {planner!r} answered with the plan {', '.join(plan)}, which fails its replay: {found.reason} "
+            "This is a fault of the planner or of the oracle; please report it."
+        )

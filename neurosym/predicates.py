@@ -1,0 +1,138 @@
+"""Ready-made geometric predicates for domains whose world is an `Assembly`.
+
+Each is made from the fluent that says which parts are there::
+
+    free, stable_without = ns.predicates.free(present), ns.predicates.stable_without(present)
+
+and answers with evidence: which parts block, in which directions; which parts fall and what they lose. What a
+verdict promises (`until`) follows from removal tasks: parts that left do not come back. A domain in which
+parts also return must pass ``removal=False``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from numpy.typing import ArrayLike
+
+from neurosym.errors import DefinitionError
+from neurosym.geometry.assembly import Assembly
+from neurosym.geometry.blocking import bits
+from neurosym.geometry.sweep import exits_along
+from neurosym.language.state import State
+from neurosym.language.terms import Atom, Derived, Fluent, Type
+from neurosym.problem import Verdict
+
+
+def free(
+    present: Fluent, *, directions: ArrayLike | None = None, table: bool = True, removal: bool = True
+) -> Derived:
+    """``free(p)``: part p can leave by one straight translation, past the parts present and the table.
+
+    Args:
+        present: the fluent, of one part, that says which parts are there.
+        directions: float64 (k, 3), tried in order; default the axes the assembly is built along, up first.
+        table: whether the table is in the way of what moves down.
+        removal: parts that left do not come back, so that a verdict may promise.
+    """
+    part = _part_type(present)
+
+    def ask(world: Assembly, state: State, p: str) -> Verdict:
+        graph = world.blocking(directions)
+        names = world.names
+        number = world.index[p]
+        there = state.mask(present, names) & ~(1 << number)
+        into_table = graph.into_table
+        witnesses, because = 0, 0
+        for d in range(len(graph.directions)):
+            if table and into_table[d]:
+                continue
+            if world.keeps_answers:
+                hit = graph.by_part[d][number] & there
+            else:
+                hit = sum(1 << o for o in exits_along(world, number, graph.directions[d], bits(there)))
+            if not hit:
+                return Verdict(True, (), f"{p} is free along {graph.describe(d)}.", None, graph.vectors[d])
+            because |= hit
+            # One blocker a direction keeps the promise; one that blocks several keeps it for all of them.
+            if not witnesses & hit:
+                witnesses |= hit & -hit
+        said = "; ".join(
+            f"{graph.describe(d)}: "
+            + ("the table" if table and into_table[d] else ", ".join(world.in_mask(graph.by_part[d][number] & there)))
+            for d in range(len(graph.directions))
+        )
+        until = tuple(Atom(present, (n,)) for n in world.in_mask(witnesses)) if removal else None
+        return Verdict(False, world.in_mask(because), f"{p} is blocked in every direction ({said}).", until)
+
+    return Derived("free", [part], ask)
+
+
+def interlocked(present: Fluent, *, directions: ArrayLike | None = None, table: bool = True) -> Derived:
+    """``interlocked()``: no single part of those present is free (they may still come apart in groups)."""
+    one = free(present, directions=directions, table=table).function
+
+    def ask(world: Assembly, state: State) -> Verdict:
+        there = state.objects(present)
+        for p in there:
+            verdict = one(world, state, p)
+            if verdict.holds:
+                return Verdict(False, (p,), verdict.reason)
+        return Verdict(bool(there), there, f"No single part of {', '.join(there) or 'none'} is free.")
+
+    return Derived("interlocked", [], ask)
+
+
+def supported(present: Fluent, *, removal: bool = True) -> Derived:
+    """``supported(p)``: something under part p, a part present or the table, touches it from below."""
+    part = _part_type(present)
+
+    def ask(world: Assembly, state: State, p: str) -> Verdict:
+        stability = world.stability()
+        number = world.index[p]
+        carriers = world.in_mask(stability.supports[number] & state.mask(present, world.names))
+        if stability.on_table >> number & 1:
+            carriers = (*carriers, "the table")
+        if carriers:
+            return Verdict(True, carriers, f"{p} stands on {', '.join(carriers)}.")
+        lost = world.in_mask(stability.supports[number])
+        return Verdict(False, lost, f"{p} has lost {', '.join(lost) or 'nothing'} under it.", () if removal else None)
+
+    return Derived("supported", [part], ask)
+
+
+def stable_without(present: Fluent, *, removal: bool = True) -> Derived:
+    """``stable_without(p)``: the parts present other than p stand still under gravity, friction included."""
+    part = _part_type(present)
+
+    def ask(world: Assembly, state: State, p: str) -> Verdict:
+        stability = world.stability()
+        there = state.mask(present, world.names)
+        rest = there & ~(1 << world.index[p])
+        answer = stability.standing(rest)
+        if answer.stands:
+            return Verdict(True, (), f"The others stand without {p}.")
+        falling = world.in_mask(answer.moving)
+        losing = [
+            f"{name} loses {p}"
+            for name in falling
+            if stability.touching[world.index[name]] >> world.index[p] & 1
+        ]
+        said = f"Without {p}, {_and(falling)} would fall" + (f" ({'; '.join(losing)})." if losing else ".")
+        # The motion stays possible while every part that moves in it is there, whatever else has left.
+        until = tuple(Atom(present, (n,)) for n in falling) if removal else None
+        return Verdict(False, falling, said, until)
+
+    return Derived("stable_without", [part], ask)
+
+
+def _and(names: Sequence[str]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+
+
+def _part_type(present: Fluent) -> Type:
+    if not isinstance(present, Fluent) or len(present.types) != 1:
+        raise DefinitionError(
+            f"Expected the fluent of one part that says which parts are there; got {present!r}. "
+            'For instance present = ns.Fluent("present", part).'
+        )
+    return present.types[0]
