@@ -17,7 +17,7 @@ import numpy as np
 from neurosym.errors import InputError
 from neurosym.geometry.assembly import Assembly
 from neurosym.problem import Rejection, Step
-from neurosym.simulation.world import Physics, Snapshot, World
+from neurosym.simulation.world import MOVED_SHARE, SETTLE_STEPS, Physics, Snapshot, World
 
 #: The state of a problem under physics: the symbols, and the actions done so far, in order.
 PhysicsState = tuple[int, tuple[int, ...]]
@@ -28,6 +28,8 @@ COLLAPSE_STEPS = 2
 COLLAPSE_MOTION = 1e-3
 #: One cube falling alone is no collapse; it is where more than this many move.
 COLLAPSE_CUBES = 1
+#: Fallen cubes are waited for until they rest, but at most this many steps: three seconds.
+_PATIENCE = 3 * SETTLE_STEPS
 #: Overlap along a straight way out that is still touch, as a share of a typical body: settled parts sink into one
 #: another by thousandths, and hulls carry a margin of 1e-3.
 PROBE_TOLERANCE = 1e-2
@@ -189,14 +191,17 @@ class PhysicsOracle:
 
     def _cubes(self, part: str) -> Rejection | _Accepted:
         world = self._world
+        before = world.poses()
         world.remove(part)
         world.step(COLLAPSE_STEPS)
-        moving = [key for key, motion in world.motion().items() if motion > COLLAPSE_MOTION]
+        moving = {key for key, motion in world.motion().items() if motion > COLLAPSE_MOTION}
+        if len(moving) <= COLLAPSE_CUBES:
+            world.settle(_PATIENCE, until_rest=True)
+            # Neighbours can hold a column for a moment, by friction, that then comes down all the same.
+            moving |= {key for key, far in world.displacement(before).items() if far > MOVED_SHARE * world.unit}
         if len(moving) > COLLAPSE_CUBES:
-            parts = tuple(dict.fromkeys(name for name, _ in moving))
+            parts = tuple(name for name in world.assembly.names if any(name == key[0] for key in moving))
             return Rejection(f"{len(moving)} cubes moved: of {_and(parts)}.", parts)
-        if moving:
-            world.settle()
         return _Accepted()
 
     def _rigid(self, part: str) -> Rejection | _Accepted:

@@ -26,6 +26,10 @@ Job = tuple[Assembly, int]
 CHUNK = 48
 
 
+#: A rectangle before its half edges scale it, facing along z.
+_SQUARE = (np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]), np.array([[0, 1, 2], [0, 2, 3]]))
+
+
 class PictureStudio:
     """Cameras and a renderer, kept ready: pictures of assemblies with the same shapes only move bodies about.
 
@@ -130,9 +134,7 @@ class PictureStudio:
 
     def _visual(self, scene: Scene, i: int) -> int:
         p, c = self._p, self._client.id
-        if i not in scene.meshes:
-            return int(p.createVisualShape(p.GEOM_BOX, halfExtents=scene.half[i].tolist(), physicsClientId=c))
-        vertices, faces = scene.meshes[i]
+        vertices, faces = scene.meshes.get(i, _SQUARE)
         # Corners are not shared between triangles: each face keeps its own normal, and edges stay sharp.
         triangles = (vertices * scene.half[i])[faces]
         normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])

@@ -111,7 +111,7 @@ def _solid(part: Part, body: Body, scale: float) -> Solid:
     corners = body.shape.vertices * scale
     half: Array | None = None
     if isinstance(body.shape, Box):
-        half = body.shape.size * scale / 2
+        half = np.round(body.shape.size * scale, 9) / 2
         # Solid cuboid: I_xx = m (b^2 + c^2) / 12 with full edges, so a third of the squared halves.
         moments = (np.sum(half**2) - half**2) / 3
         volume, centre, inertia = float(8 * np.prod(half)), np.zeros(3), np.diag(moments) * 8 * np.prod(half)
