@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from domains.collapse import RULES, check_cubes, check_standing, keeps_standing
+from domains.soma_demonstrations import demonstrate, picture_seed
 from domains.soma_pieces import LETTERS, Cell, solutions
 from neurosym import predicates
 from neurosym.demonstrations import Demonstrations
@@ -95,7 +96,7 @@ class SomaFamily(ProblemFamily):
             cubes[number],
             collapse=collapse,
             pictures=pictures,
-            seed=[seed, int(number)],
+            seed=picture_seed(seed, int(number)),
             removed=removed,
             before=before,
             name=f"soma-{number}",
@@ -123,7 +124,7 @@ class SomaFamily(ProblemFamily):
         *,
         collapse: str = "cubes",
         pictures: str = "clean",
-        seed: int | Sequence[int] = 0,
+        seed: int = 0,
         removed: Iterable[str] = (),
         before: Iterable[tuple[str, str]] = (),
         name: str = "puzzle",
@@ -142,7 +143,7 @@ class SomaFamily(ProblemFamily):
         simulation = Simulation(bodies, {n: n for n in assembly.names}, gone) if bodies else None
 
         def observe() -> NDArray[np.uint8]:
-            return self._pictures(assembly, pictures, np.random.default_rng(seed))
+            return render_views(assembly, pictures, np.random.default_rng(seed))
 
         return DOMAINS[collapse].problem(
             world=assembly,
@@ -154,7 +155,7 @@ class SomaFamily(ProblemFamily):
             family=self.name,
             observe=observe,
             simulation=simulation,
-            details={"collapse": collapse},
+            details={"collapse": collapse, "pictures": pictures, "seed": seed},
         )
 
     def numbers(self, part: str = "test", *, split: int = 0) -> tuple[int, ...]:
@@ -176,13 +177,21 @@ class SomaFamily(ProblemFamily):
         self, problem: Problem, *, style: str = "clean", rng: np.random.Generator | None = None
     ) -> NDArray[np.uint8]:
         """Four views, top and three sides: uint8 (4, 64, 64, 3)."""
-        return self._pictures(problem.world, style, rng or np.random.default_rng(0))
+        return render_views(problem.world, style, rng or np.random.default_rng(0))
 
-    def _pictures(self, assembly: Assembly, style: str, rng: np.random.Generator) -> NDArray[np.uint8]:
-        from neurosym.simulation.render import render_views
+    def observed(
+        self, problems: Sequence[Problem], *, workers: int = 1, progress: Progress | None = None
+    ) -> list[Problem]:
+        """The problems with their pictures taken, all in one go, from disk where they were taken before."""
+        from neurosym.simulation.picture_cache import cached_pictures
 
-        views: NDArray[np.uint8] = render_views(assembly, style=style, rng=rng)
-        return views
+        found: dict[int, Problem] = {}
+        for style in {str(p.details["pictures"]) for p in problems}:
+            chosen = [i for i, p in enumerate(problems) if p.details["pictures"] == style]
+            jobs = [(problems[i].world, problems[i].details["seed"]) for i in chosen]
+            pictures = cached_pictures(jobs, style=style, workers=workers, progress=progress)
+            found |= {i: problems[i].with_pictures(views) for i, views in zip(chosen, pictures)}
+        return [found[i] for i in range(len(problems))]
 
     def demonstrations(
         self,
@@ -195,8 +204,6 @@ class SomaFamily(ProblemFamily):
         progress: Progress | None = None,
     ) -> Demonstrations:
         """Demonstrations for a training recipe: see `domains.soma_demonstrations`."""
-        from domains.soma_demonstrations import demonstrate
-
         numbers = self.numbers(part, split=split)
         return demonstrate(self, numbers, recipe=recipe, style=style, seed=seed, progress=progress)
 
@@ -213,6 +220,14 @@ class SomaFamily(ProblemFamily):
 
         counts = [count_plans(p) for p in self.problems("all", collapse="strict")]
         return sum(counts), min(counts), max(counts)
+
+
+def render_views(assembly: Assembly, style: str, rng: np.random.Generator) -> NDArray[np.uint8]:
+    """Top and three sides, uint8 (4, 64, 64, 3)."""
+    from neurosym.simulation import render  # loads PyBullet
+
+    views: NDArray[np.uint8] = render.render_views(assembly, style=style, rng=rng)
+    return views
 
 
 def _check_connected(name: str, cells: Sequence[tuple[int, ...]]) -> None:

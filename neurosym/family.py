@@ -46,6 +46,12 @@ class ProblemFamily(ABC):
         """Pictures of the finished work, uint8 (V, H, W, 3)."""
         raise NotImplementedError(f"the domain {self.name!r} has no pictures")
 
+    def observed(
+        self, problems: Sequence[Problem], *, workers: int = 1, progress: Progress | None = None
+    ) -> list[Problem]:
+        """The same problems with their pictures taken; a family that can take many at once overrides it."""
+        return list(problems)
+
     def demonstrations(
         self,
         part: str = "train",
