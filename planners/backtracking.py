@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from neurosym.planner import Budget, Planner, PlannerTraits, PlanResult, SearchLog, Status
 from neurosym.prior import OrderScores
-from neurosym.problem import Rejection, SearchProblem
+from neurosym.problem import Rejection, SearchProblem, Step
 from planners.completion import RESOLUTION, Completion, remainder, with_first
 from planners.evidence import Names, fitted, promise, representatives
 
@@ -68,6 +68,7 @@ class _Search(Generic[S]):
         self.named = Names(problem)
         self.agenda: list[int] = []  # named by refusals, the latest first
         self.promises: dict[int, list[int]] = {}  # action -> masks, of all frames on the path
+        self.answers: dict[tuple[S, int], Step[S] | Rejection] = {}
         self.dead: set[tuple[S, int]] = set()
         self.path: list[_Frame[S]] = []
         self.prefix: list[int] = []
@@ -86,10 +87,13 @@ class _Search(Generic[S]):
             if action is None:
                 self._leave()
                 continue
-            if self.log.out_of_budget():
-                return self.log.failed(Status.OUT_OF_BUDGET, first_guess_failed=self._first_guess_failed() or None)
+            answer = self.answers.get((frame.state, action))
+            if answer is None:
+                if self.log.out_of_budget():
+                    return self.log.failed(Status.OUT_OF_BUDGET, first_guess_failed=self._first_guess_failed() or None)
+                answer = self.log.attempt(tuple(self.prefix), frame.state, action)
+                self.answers[frame.state, action] = answer
             frame.untried.remove(action)
-            answer = self.log.attempt(tuple(self.prefix), frame.state, action)
             if isinstance(answer, Rejection):
                 self._learn(frame, action, answer)
                 continue

@@ -1,0 +1,248 @@
+"""Small search problems that know their answers, for testing planners without any domain.
+
+They satisfy `SearchProblem`. `brute_force_plans` finds all their plans, and shares no code with any planner.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Generic, TypeVar
+
+import numpy as np
+
+from neurosym.problem import Rejection, SearchProblem, Step
+
+S = TypeVar("S", bound=Hashable)
+
+
+@dataclass(frozen=True)
+class NumberLine:
+    """Walk from 0 to `goal` by steps of the given sizes, each usable once, never leaving 0 .. `limit`.
+
+    Equal sizes are interchangeable. The goal may be reached by differing numbers of steps.
+    """
+
+    sizes: tuple[int, ...]
+    goal: int
+    limit: int = 9
+    initial: int = 0
+
+    @property
+    def actions(self) -> tuple[str, ...]:
+        return tuple(f"{size:+d}#{i}" for i, size in enumerate(self.sizes))
+
+    @property
+    def classes(self) -> tuple[int, ...]:
+        return self.sizes
+
+    def is_goal(self, state: int) -> bool:
+        return state == self.goal
+
+    def candidates(self, state: int) -> list[int]:
+        return list(range(len(self.sizes)))
+
+    def attempt(self, state: int, action: int) -> Step[int] | Rejection:
+        there = state + self.sizes[action]
+        if not 0 <= there <= self.limit:
+            return Rejection(f"{there} is off the line.")
+        return Step(there, how=there)
+
+
+@dataclass(frozen=True)
+class Removal:
+    """Take parts away, one an action; states are bitsets of the parts that are gone.
+
+    Attributes:
+        blockers: a part leaves by any of its directions; each is a bitset of parts that stand in its way.
+        spoilers: a part can never leave once one of these is gone. This is what makes dead ends.
+        needs: parts that must be gone before a part becomes a candidate at all.
+        target: the parts that must go.
+        promises: whether refusals promise anything (`Rejection.until`).
+    """
+
+    blockers: tuple[tuple[int, ...], ...]
+    spoilers: tuple[int, ...]
+    needs: tuple[int, ...]
+    target: int
+    promises: bool = True
+    initial: int = 0
+
+    @classmethod
+    def random(
+        cls, seed: int, n: int = 5, *, blocking: float = 0.25, spoiling: float = 0.06, partial: bool = False
+    ) -> Removal:
+        """A structure drawn from `seed`: sometimes solvable, sometimes not, with dead ends.
+
+        Args:
+            seed: of everything.
+            n: parts.
+            blocking: how likely one part stands in another's way, in each of one or two directions.
+            spoiling: how likely the removal of one part makes another's impossible.
+            partial: ask for two of the parts only, so that plans differ in length.
+        """
+        rng = np.random.default_rng(seed)
+
+        def some(part: int, chance: float) -> int:
+            return sum(1 << other for other in range(n) if other != part and rng.random() < chance)
+
+        blockers = tuple(tuple(some(p, blocking) for _ in range(int(rng.integers(1, 3)))) for p in range(n))
+        spoilers = tuple(some(p, spoiling) for p in range(n))
+        needs = tuple(some(p, 0.04) for p in range(n))
+        wanted = rng.permutation(n)[:2] if partial else range(n)
+        return cls(blockers, spoilers, needs, sum(1 << int(p) for p in wanted), promises=bool(rng.random() < 0.7))
+
+    @classmethod
+    def loose(cls, n: int) -> Removal:
+        """Nothing stands in the way of anything: every order is a plan."""
+        return cls(((0,),) * n, (0,) * n, (0,) * n, (1 << n) - 1)
+
+    @property
+    def actions(self) -> tuple[str, ...]:
+        return tuple(f"part{p}" for p in range(len(self.blockers)))
+
+    @property
+    def classes(self) -> tuple[int, ...]:
+        return tuple(range(len(self.blockers)))
+
+    def is_goal(self, state: int) -> bool:
+        return state & self.target == self.target
+
+    def candidates(self, state: int) -> list[int]:
+        return [p for p in range(len(self.blockers)) if not state >> p & 1 and self.needs[p] & ~state == 0]
+
+    def attempt(self, state: int, action: int) -> Step[int] | Rejection:
+        if self.spoilers[action] & state:
+            return Rejection("Its support is gone for good.", until=(action,) if self.promises else ())
+        present = [way & ~state for way in self.blockers[action]]
+        if not all(present):
+            return Step(state | 1 << action, how=present.index(0))
+        # One blocker a direction: while they all stay, so does the part.
+        first = dict.fromkeys((way & -way).bit_length() - 1 for way in present)
+        names = tuple(self.actions[p] for p in first)
+        return Rejection("Blocked in every direction.", names, tuple(first) if self.promises else ())
+
+
+@dataclass(frozen=True)
+class Tiles:
+    """Spell one of the words with letter tiles; equal letters are interchangeable.
+
+    The oracle refuses a letter that begins no word only from the third letter on: the first two may lead astray.
+    """
+
+    letters: str
+    words: tuple[str, ...]
+    initial: str = ""
+
+    @property
+    def actions(self) -> tuple[str, ...]:
+        return tuple(f"{letter}{i}" for i, letter in enumerate(self.letters))
+
+    @property
+    def classes(self) -> tuple[int, ...]:
+        return tuple(ord(letter) for letter in self.letters)
+
+    def is_goal(self, state: str) -> bool:
+        return state in self.words
+
+    def candidates(self, state: str) -> list[int]:
+        return list(range(len(self.letters)))
+
+    def attempt(self, state: str, action: int) -> Step[str] | Rejection:
+        spelt = state + self.letters[action]
+        if len(spelt) > 2 and not any(word.startswith(spelt) for word in self.words):
+            return Rejection(f"No word begins with {spelt}.")
+        return Step(spelt)
+
+
+@dataclass(frozen=True)
+class Relabelled(Generic[S]):
+    """The same problem with its actions in another order: action i here is `order[i]` there."""
+
+    problem: SearchProblem[S]
+    order: tuple[int, ...]
+
+    @property
+    def actions(self) -> tuple[str, ...]:
+        return tuple(self.problem.actions[a] for a in self.order)
+
+    @property
+    def classes(self) -> tuple[int, ...]:
+        return tuple(self.problem.classes[a] for a in self.order)
+
+    @property
+    def initial(self) -> S:
+        return self.problem.initial
+
+    def is_goal(self, state: S) -> bool:
+        return self.problem.is_goal(state)
+
+    def candidates(self, state: S) -> list[int]:
+        return [self.order.index(a) for a in self.problem.candidates(state)]
+
+    def attempt(self, state: S, action: int) -> Step[S] | Rejection:
+        answer = self.problem.attempt(state, self.order[action])
+        if isinstance(answer, Rejection):
+            return Rejection(answer.reason, answer.because, tuple(self.order.index(a) for a in answer.until))
+        return answer
+
+
+@dataclass
+class Counting(Generic[S]):
+    """The same problem, counting what is asked of it, and whether anything was asked that is no candidate."""
+
+    problem: SearchProblem[S]
+    attempts: int = 0
+    refusals: int = 0
+    expansions: int = 0
+    no_candidates: list[tuple[S, int]] = field(default_factory=list)
+
+    @property
+    def actions(self) -> Sequence[str]:
+        return self.problem.actions
+
+    @property
+    def classes(self) -> Sequence[int]:
+        return self.problem.classes
+
+    @property
+    def initial(self) -> S:
+        return self.problem.initial
+
+    def is_goal(self, state: S) -> bool:
+        return self.problem.is_goal(state)
+
+    def candidates(self, state: S) -> list[int]:
+        self.expansions += 1
+        return list(self.problem.candidates(state))
+
+    def attempt(self, state: S, action: int) -> Step[S] | Rejection:
+        self.attempts += 1
+        if action not in self.problem.candidates(state):
+            self.no_candidates.append((state, action))
+        answer = self.problem.attempt(state, action)
+        self.refusals += isinstance(answer, Rejection)
+        return answer
+
+
+def brute_force_plans(problem: SearchProblem[Any]) -> Iterator[tuple[int, ...]]:
+    """Every order of actions that reaches the goal, ending there, as indices; for up to about six actions.
+
+    Of orders that differ only by interchangeable actions, the first by index.
+    """
+
+    def extend(state: Any, prefix: tuple[int, ...]) -> Iterator[tuple[int, ...]]:
+        if problem.is_goal(state):
+            yield prefix
+            return
+        seen = set()
+        for action in sorted(problem.candidates(state)):
+            label = problem.classes[action]
+            if action in prefix or label in seen:
+                continue
+            seen.add(label)
+            answer = problem.attempt(state, action)
+            if isinstance(answer, Step):
+                yield from extend(answer.state, (*prefix, action))
+
+    return extend(problem.initial, ())
