@@ -70,14 +70,14 @@ def plans(
     generator = rng if isinstance(rng, np.random.Generator) else np.random.default_rng(0 if rng is None else rng)
     scores = advice(problem, prior)
     with ExitStack() as stack:
-        search: SearchProblem[Any] = stack.enter_context(_oracle(problem, oracle))
+        search: SearchProblem[Any] = stack.enter_context(open_oracle(problem, oracle))
         if k is None:
             results = [searcher.plan(search, scores, budget=budget, rng=generator)]
         else:
             results = searcher.plans(search, scores, k=k, budget=budget, rng=generator)  # type: ignore[attr-defined]
     for result in results:
         if result.plan is not None:
-            _check(problem, result.plan, oracle, planner)
+            check_plan(problem, result.plan, oracle, planner)
     return results
 
 
@@ -108,7 +108,7 @@ class _Geometry:
         pass
 
 
-def _oracle(problem: Problem, oracle: str) -> Any:
+def open_oracle(problem: Problem, oracle: str) -> Any:
     if oracle == "geometry":
         return _Geometry(problem)
     if oracle != "physics":
@@ -125,11 +125,11 @@ def _oracle(problem: Problem, oracle: str) -> Any:
     return PhysicsOracle(problem.ground(), problem.world, removes=removes, bodies=rule.bodies, absent=rule.absent)
 
 
-def _check(problem: Problem, plan: Sequence[str], oracle: str, planner: object) -> None:
+def check_plan(problem: Problem, plan: Sequence[str], oracle: str, planner: object) -> None:
     if oracle == "geometry":
         found = validate(problem, plan)
     else:
-        with _oracle(problem, oracle) as search:
+        with open_oracle(problem, oracle) as search:
             found = replay(search, plan)
     if not found.ok:
         raise ContractError(

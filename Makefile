@@ -1,0 +1,57 @@
+# The two commands to know are `make demo` and `make test`; each makes the virtual environment when it is missing.
+# VENV= chooses where it is, PYTHON= what it is made with.
+
+VENV ?= .venv
+# 3.11 is the newest Python with a pybullet wheel. Asked to run, not only found: version managers leave empty shims.
+PYTHON ?= $(shell python3.11 -c 'print("python3.11")' 2>/dev/null || echo python3)
+BIN := $(VENV)/bin
+STAMP := $(VENV)/.neurosym-installed
+SRC := neurosym domains planners learned_priors tests examples $(wildcard benchmarks)
+OUT ?= out/compare-soma
+
+.PHONY: help setup demo test check bench clean constraints
+
+help:
+	@echo "make demo    compare planners and priors on the 120 test cubes (table, results.csv, iterations.png)"
+	@echo "make test    the whole test suite"
+	@echo "make check   ruff, mypy --strict, import-linter"
+	@echo "make bench   the benchmarks"
+	@echo "make setup   only make the virtual environment (VENV=$(VENV) PYTHON=$(PYTHON))"
+	@echo "make clean   remove what the above made, the virtual environment excepted"
+
+setup: $(STAMP)
+
+# Editing what is to be installed installs it again; an environment that exists is kept and brought up to date.
+$(STAMP): pyproject.toml constraints.txt
+	@command -v $(PYTHON) >/dev/null || { echo "No $(PYTHON) here. Install Python 3.11, or name one: make $@ PYTHON=..."; exit 1; }
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+		{ echo "Expected Python 3.11 or later; $(PYTHON) is $$($(PYTHON) --version). Name another: PYTHON=..."; exit 1; }
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11))' || \
+		echo "Note: $$($(PYTHON) --version) has no pybullet wheel, so pybullet will be compiled: that needs a C++ compiler and takes minutes. With python3.11 installed it would not."
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev]'
+	@touch $@
+
+demo: $(STAMP)
+	$(BIN)/neurosym compare soma --problems test --out $(OUT)
+
+# Two processes, one thread each: numerical libraries that start threads of their own on a shared machine crawl.
+test: $(STAMP)
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2
+
+check: $(STAMP)
+	$(BIN)/ruff check .
+	$(BIN)/mypy --strict
+	$(BIN)/lint-imports
+
+bench: $(STAMP)
+	@for file in benchmarks/*.py; do echo "== $$file"; OMP_NUM_THREADS=1 $(BIN)/python $$file || exit 1; done
+
+# What is installed now becomes what is pinned. GPU libraries follow from torch and are left to it.
+constraints: $(STAMP)
+	{ head -1 constraints.txt; $(BIN)/python -m pip freeze --exclude-editable | grep -vE '^(nvidia|cuda|triton|#)'; } > constraints.tmp
+	mv constraints.tmp constraints.txt
+
+clean:
+	rm -rf out dist build .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
+	find $(SRC) -name __pycache__ -prune -exec rm -rf {} +
