@@ -28,6 +28,9 @@ COLLAPSE_STEPS = 2
 COLLAPSE_MOTION = 1e-3
 #: One cube falling alone is no collapse; it is where more than this many move.
 COLLAPSE_CUBES = 1
+#: Share of their width that cubes give up at their sides (see `Physics.clearance`). Against the integer rule on hard
+#: orders, first failures agreed in 75 of 80 with none and in 80 of 80 with 1e-3 or 1e-2; real puzzles have play too.
+CUBES_CLEARANCE = 1e-3
 #: Fallen cubes are waited for until they rest, but at most this many steps: three seconds.
 _PATIENCE = 3 * SETTLE_STEPS
 #: Overlap along a straight way out that is still touch, as a share of a typical body: settled parts sink into one
@@ -78,7 +81,8 @@ class PhysicsOracle:
         removes: for each action of `base`, the name of the part it takes away.
         bodies: the rule.
         absent: names of parts that are gone at the start.
-        physics: friction, gravity and the solver's numbers.
+        physics: friction, gravity and the solver's numbers; None takes the assembly's friction, and for ``"cubes"``
+            a clearance of `CUBES_CLEARANCE`.
 
     Raises:
         InputError: `removes` does not fit the actions or the parts, or a part cannot be simulated.
@@ -108,6 +112,7 @@ class PhysicsOracle:
         self._answers: OrderedDict[tuple[int, ...], Rejection | _Accepted] = OrderedDict()
         self._now: tuple[int, ...] | None = ()
         kind: Literal["cubes", "parts"] = "cubes" if bodies == "cubes" else "parts"
+        physics = physics or Physics(clearance=CUBES_CLEARANCE if bodies == "cubes" else 0.0)
         self._world = World(assembly, bodies=kind, physics=physics, present=present)
 
     def close(self) -> None:

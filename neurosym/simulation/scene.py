@@ -254,7 +254,10 @@ def scene_of(assembly: Assembly, colours: Mapping[str, RGB] | None = None) -> Sc
     is_box = np.array([isinstance(body.shape, Box) for body in assembly.bodies])
     others = np.flatnonzero(~is_box)
     frames, half, owner = _faces(assembly, poses, np.flatnonzero(is_box), scale)
-    meshes = {len(frames) + i: (_shape(assembly, n).vertices, _shape(assembly, n).faces) for i, n in enumerate(others.tolist())}
+    meshes = {
+        len(frames) + i: (_shape(assembly, n).vertices, _shape(assembly, n).faces)
+        for i, n in enumerate(others.tolist())
+    }
     frames = np.concatenate([frames, poses[others]])
     half = np.concatenate([half, np.full((len(others), 3), scale)])
     owner = np.concatenate([owner, assembly.owners[others]])

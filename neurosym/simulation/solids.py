@@ -83,13 +83,14 @@ def typical_extent(assembly: Assembly) -> float:
     return float(np.median([np.cbrt(np.prod(e)) for e in extents]))
 
 
-def rigid_bodies(assembly: Assembly, kind: BodiesKind, scale: float) -> tuple[RigidBody, ...]:
+def rigid_bodies(assembly: Assembly, kind: BodiesKind, scale: float, clearance: float = 0.0) -> tuple[RigidBody, ...]:
     """The bodies that a simulation of `assembly` moves, lengths multiplied by `scale`.
 
     Args:
         assembly: parts in the world.
         kind: ``"parts"``: each part is one rigid compound; ``"cubes"``: each piece of it is a body of its own.
         scale: scene lengths per length unit of the assembly.
+        clearance: share of its width that an upright box gives up at its sides (not at its top and bottom).
 
     Raises:
         InputError: `kind` is neither, or a part has a mesh that is not convex.
@@ -99,19 +100,23 @@ def rigid_bodies(assembly: Assembly, kind: BodiesKind, scale: float) -> tuple[Ri
     heaviest = max(part.density for part in assembly.parts)
     made = []
     for part in assembly.parts:
-        solids = [_solid(part, body, scale) for body in part.bodies]
+        solids = [_solid(part, body, scale, clearance) for body in part.bodies]
         groups: Sequence[Sequence[Solid]] = [solids] if kind == "parts" else [[solid] for solid in solids]
         made += [_join(part.name, i, group, part.density / heaviest) for i, group in enumerate(groups)]
     return tuple(made)
 
 
-def _solid(part: Part, body: Body, scale: float) -> Solid:
+def _solid(part: Part, body: Body, scale: float, clearance: float) -> Solid:
     X_WB = np.array(part.X_WP @ body.X_PB, dtype=np.float64)
     X_WB[:3, 3] *= scale
     corners = body.shape.vertices * scale
     half: Array | None = None
     if isinstance(body.shape, Box):
         half = np.round(body.shape.size * scale, 9) / 2
+        upright = np.abs(X_WB[2, :3]) > 1 - 1e-6
+        if clearance and upright.any():
+            half = np.where(upright, half, half * (1 - clearance))
+            corners = np.sign(corners) * half
         # Solid cuboid: I_xx = m (b^2 + c^2) / 12 with full edges, so a third of the squared halves.
         moments = (np.sum(half**2) - half**2) / 3
         volume, centre, inertia = float(8 * np.prod(half)), np.zeros(3), np.diag(moments) * 8 * np.prod(half)

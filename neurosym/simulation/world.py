@@ -48,12 +48,15 @@ class Physics:
         gravity: in scene units per second squared, downward along z.
         time_step: seconds. 1/60 changes 6 verdicts in 100.
         solver_iterations: of Bullet's contact solver, each step.
+        clearance: share of its width that an upright box gives up at its sides, so that neighbours side by side
+            do not touch. With none, Bullet's solver lets them press on one another, and what should fall may jam.
     """
 
     friction: float | None = None
     gravity: float = 9.81
     time_step: float = 1 / 240
     solver_iterations: int = 50
+    clearance: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +97,8 @@ class World:
         self.unit = typical_extent(assembly)
         self._scale = 1 / self.unit
         self._ground = assembly.ground if ground is None else ground
-        self._made = {(body.part, body.index): body for body in rigid_bodies(assembly, bodies, self._scale)}
+        made = rigid_bodies(assembly, bodies, self._scale, self.physics.clearance)
+        self._made = {(body.part, body.index): body for body in made}
         self._corners = {key: body.corners_C for key, body in self._made.items()}
         self._ids: dict[BodyKey, int] = {}
         if present is not None and (unknown := set(present) - {part for part, _ in self._made}):
