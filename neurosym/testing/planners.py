@@ -17,7 +17,7 @@ from neurosym.planner import MAX_BLAME, Budget, Planner, PlanResult, Status
 from neurosym.prior import OrderScores
 from neurosym.problem import SearchProblem, Step
 from neurosym.registry import load_planner
-from neurosym.testing.toys import Counting, NumberLine, Relabelled, Removal, Tiles, brute_force_plans
+from neurosym.testing.toys import Counting, NumberLine, Relabelled, Removal, Table, Tiles, brute_force_plans
 
 #: Costs further apart than this (nats) differ. Planners may take costs within 1e-6 nats a plan for equal.
 TOLERANCE = 1e-5
@@ -47,6 +47,7 @@ def toys(seeds: int = 12) -> list[Toy]:
         Toy.of("number line without a way", NumberLine((2, 2, 4), goal=5)),
         Toy.of("goal at the start", NumberLine((1, 2), goal=0)),
         Toy.of("no actions, no goal", NumberLine((), goal=1)),
+        Toy.of("one state reached in two ways", Table.crossing()),
         Toy.of("loose parts", Removal.loose(4)),
         Toy.of("tiles", Tiles("eestt", ("test", "sete", "es", "tee"))),
         Toy.of("tiles without a word", Tiles("aab", ("abba",))),

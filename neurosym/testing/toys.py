@@ -5,7 +5,7 @@ They satisfy `SearchProblem`. `brute_force_plans` finds all their plans, and sha
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Generic, TypeVar
 
@@ -153,6 +153,45 @@ class Tiles:
         if len(spelt) > 2 and not any(word.startswith(spelt) for word in self.words):
             return Rejection(f"No word begins with {spelt}.")
         return Step(spelt)
+
+
+@dataclass(frozen=True)
+class Table:
+    """A problem written out: where each action leads from each state. What is not listed is refused.
+
+    Attributes:
+        actions: their names; each is its own class.
+        leads: (state, action) -> state.
+        goal: the state to reach.
+        names: (state, action) -> the actions that its refusal names as evidence, without a promise.
+    """
+
+    actions: tuple[str, ...]
+    leads: Mapping[tuple[str, str], str]
+    goal: str
+    names: Mapping[tuple[str, str], tuple[str, ...]] = field(default_factory=dict)
+    initial: str = "start"
+
+    @classmethod
+    def crossing(cls) -> Table:
+        """Two ways lead to one state, and only one of them leaves the action that is needed there."""
+        return cls(("a", "b"), {("start", "a"): "middle", ("start", "b"): "middle", ("middle", "a"): "end"}, "end")
+
+    @property
+    def classes(self) -> tuple[int, ...]:
+        return tuple(range(len(self.actions)))
+
+    def is_goal(self, state: str) -> bool:
+        return state == self.goal
+
+    def candidates(self, state: str) -> list[int]:
+        return list(range(len(self.actions)))
+
+    def attempt(self, state: str, action: int) -> Step[str] | Rejection:
+        key = (state, self.actions[action])
+        if key in self.leads:
+            return Step(self.leads[key])
+        return Rejection(f"{key[1]} leads nowhere from {state}.", self.names.get(key, ()))
 
 
 @dataclass(frozen=True)
