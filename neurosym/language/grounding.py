@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-from neurosym.errors import ContractError, DefinitionError
+from neurosym.errors import ContractError, DefinitionError, UnknownNameError
 from neurosym.language.domain import check_precedence
 from neurosym.language.terms import Atom, Derived, Fluent, Literal
 from neurosym.problem import Rejection, Step, Verdict
@@ -63,7 +63,7 @@ class GroundProblem:
         self._goal_pos = self._mask(g.atom for g in self._fluent_goals if g.positive)
         self._goal_neg = self._mask(g.atom for g in self._fluent_goals if not g.positive)
         self._done_bits = done
-        self.classes: tuple[int, ...] = self._classes({a for pair in precedence for a in pair})
+        self.classes: tuple[int, ...] = self._classes(all_names, {a for pair in precedence for a in pair})
         self._touching: dict[Atom, tuple[int, ...]] = {}
         for i, instance in enumerate(reachable):
             for effect in instance.eff:
@@ -198,12 +198,15 @@ class GroundProblem:
             mask |= 1 << self._bits[atom]
         return mask
 
-    def _classes(self, constrained: set[int]) -> tuple[int, ...]:
+    def _classes(self, all_names: Sequence[str], constrained: set[int]) -> tuple[int, ...]:
         place = f"In problem {self.problem.name!r}, interchangeable"
         index = {name: i for i, name in enumerate(self.actions)}
         classes = list(range(len(self.actions)))
         grouped: set[str] = set()
-        for group in self.problem.interchangeable:
+        for number, group in enumerate(self.problem.interchangeable):
+            for name in group:
+                if name not in all_names:
+                    raise DefinitionError(f"{place}[{number}]: {UnknownNameError('action', name, all_names)}")
             twice = grouped & set(group)
             if twice or len(set(group)) != len(group):
                 raise DefinitionError(f"{place}: expected each action in one group; {sorted(twice) or group} is not.")
@@ -269,7 +272,8 @@ def _reachable(initial: set[Atom], instances: Sequence[_Instance]) -> list[_Inst
         if not now:
             break
         found.extend(now)
-        waiting = [i for i in waiting if i not in now]
+        taken = set(map(id, now))
+        waiting = [i for i in waiting if id(i) not in taken]
         for i in now:
             true.update(e.atom for e in i.eff if e.positive)
     order = {id(i): k for k, i in enumerate(instances)}
