@@ -40,6 +40,10 @@ class ProblemFamily(ABC):
     def problems(self, part: str = "test", *, split: int = 0, **options: Any) -> Sequence[Problem]:
         """The problems of a part, ``"train"``, ``"test"`` or ``"all"``; "train" and "test" never overlap."""
 
+    def numbers(self, part: str = "test", *, split: int = 0) -> Sequence[int]:
+        """Numbers of the problems of a part, as `problem` takes them; benchmarks rebuild problems from these."""
+        raise NotImplementedError(f"the domain {self.name!r} does not number its problems")
+
     def pictures(
         self, problem: Problem, *, style: str = "clean", rng: np.random.Generator | None = None
     ) -> NDArray[np.uint8]:

@@ -1,0 +1,62 @@
+"""A journal of finished work: JSON lines, each a key and a value, appended whole; a torn last line is ignored."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+
+def key_of(configuration: Any) -> str:
+    """A digest of everything that decides a result (JSON-able)."""
+    text = json.dumps(configuration, sort_keys=True, separators=(",", ":"), default=str)
+    return hashlib.sha256(text.encode()).hexdigest()[:32]
+
+
+class Journal:
+    """Finished results by key. With a path of None it remembers nothing.
+
+    Args:
+        path: the file; made, with its folder, at the first `add`.
+    """
+
+    def __init__(self, path: str | Path | None) -> None:
+        self.path = None if path is None else Path(path)
+        self._entries: dict[str, dict[str, Any]] = {}
+        self._torn = False
+        if self.path is not None and self.path.exists():
+            for line in self.path.read_bytes().split(b"\n"):
+                try:
+                    entry = json.loads(line)
+                    self._entries[entry["key"]] = dict(entry["value"])
+                except (ValueError, KeyError, TypeError):
+                    # What a kill left half written is done again.
+                    self._torn = self._torn or bool(line)
+
+    def __contains__(self, key: str) -> bool:
+        return key in self._entries
+
+    def __getitem__(self, key: str) -> dict[str, Any]:
+        return self._entries[key]
+
+    def __len__(self) -> int:
+        return len(self._entries)
+
+    def add(self, entries: Mapping[str, Mapping[str, Any]]) -> None:
+        """Keep finished results: all lines in one write, on disk when this returns."""
+        if self.path is None or not entries:
+            return
+        lines = "".join(json.dumps({"key": key, "value": dict(value)}) + "\n" for key, value in entries.items())
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        handle = os.open(self.path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o644)
+        try:
+            # Whatever was torn ends here, so that the next line begins on its own.
+            os.write(handle, (("\n" if self._torn else "") + lines).encode())
+            os.fsync(handle)
+        finally:
+            os.close(handle)
+        self._torn = False
+        self._entries.update({key: dict(value) for key, value in entries.items()})
