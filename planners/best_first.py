@@ -215,7 +215,8 @@ class _Search(Generic[S]):
         node.waiting = representatives(self.log.candidates(node.state), node.used, classes)
         if not node.waiting:
             return
-        node.log_total = math.log(sum(math.exp(-self._cost(node, a)) for a in node.waiting))
+        if not self.lazy:  # A* asks for no policy
+            node.log_total = math.log(sum(math.exp(-self._cost(node, a)) for a in node.waiting))
         if self.lazy and node.guess:
             action = next((a for a in node.waiting if classes[a] == classes[node.guess[0]]), None)
             if action is not None:
@@ -223,11 +224,15 @@ class _Search(Generic[S]):
                 node.waiting.remove(action)
                 self._push(node.bound, node.depth + 1, node, action)
             # No sibling can be cheaper than the best completion, so their costs are worked out only if need be.
-            self._push(node.bound, node.depth + 1, node, _SIBLINGS)
+            if node.waiting:
+                self._push(node.bound, node.depth + 1, node, _SIBLINGS)
         else:
             self._queue_all(node)
 
     def _queue_all(self, node: _Node[S]) -> None:
+        if self.lazy and (self.completion is None or self.completion.indifferent):
+            self._queue_one(node)
+            return
         totals: NDArray[np.float64] | None = None
         if self.completion is not None and self.priority is not levin:
             survey = self.completion.survey(node.depth, node.used)
@@ -240,6 +245,18 @@ class _Search(Generic[S]):
             key = self.priority(Outlook(node.depth + 1, node.path_cost + cost, to_go, log_policy))
             self._push(key, node.depth + 1, node, action)
         node.waiting = []
+
+    def _queue_one(self, node: _Node[S]) -> None:
+        """Where nothing is preferred, one at random; the siblings wait for as long as it leads on."""
+        chosen = int(self.rng.integers(len(node.waiting)))
+        node.waiting[chosen], node.waiting[-1] = node.waiting[-1], node.waiting[chosen]
+        action = node.waiting.pop()
+        bound = 0.0
+        if self.completion is not None:
+            bound = node.path_cost + float(self.completion.survey(node.depth, node.used).values[action])
+        self._push(bound, node.depth + 1, node, action)
+        if node.waiting:
+            self._push(bound, node.depth + 1, node, _SIBLINGS)
 
     def _restated(self, guess: tuple[int, ...], options: list[int]) -> tuple[int, ...]:
         """The completion, beginning with the member of its class that is asked for here."""

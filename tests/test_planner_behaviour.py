@@ -11,7 +11,7 @@ from neurosym.planner import Status
 from neurosym.prior import OrderScores
 from neurosym.testing.toys import Counting, NumberLine, Removal, Table, Tiles
 from planners import Backtracking, BestFirst, Exhaustive, SwapRepair, count_plans, order_marginals
-from planners.completion import Completion
+from planners.completion import Completion, remainder, with_first
 
 COMPLETE = [Backtracking(), BestFirst(), BestFirst(priority="greedy"), BestFirst(priority="levin"), Exhaustive()]
 
@@ -123,19 +123,24 @@ def test_a_followed_completion_costs_one_assignment(monkeypatch: pytest.MonkeyPa
     calls = []
     original = Completion.survey
     monkeypatch.setattr(Completion, "survey", lambda self, *a: calls.append(a) or original(self, *a))
-    word = Tiles("tsetest", ("tetsset", "testset"))
-    letters = {c: i for i, c in enumerate("est")}
-    table = np.full((7, 7), -8.0)
-    for step, letter in enumerate("testset"):
-        for action, tile in enumerate(word.letters):
-            table[step, action] = -8.0 if letters[letter] != letters[tile] else 0.0
-    scores = OrderScores(table, word.actions, classes=word.classes)
-    for planner in (Backtracking(), BestFirst()):
-        calls.clear()
-        result = planner.plan(word, scores, rng=np.random.default_rng(1))
-        assert result.iterations == 0
-        assert "".join(name[0] for name in result.plan) == "testset"
-        assert len(calls) == 1
+    for rng in rngs(10):
+        word = Tiles("".join(rng.permutation(list("testset"))), ("tetsset", "testset"))
+        table = np.array([[0.0 if tile == letter else -8.0 for tile in word.letters] for letter in "testset"])
+        scores = OrderScores(table, word.actions, classes=word.classes)
+        for planner in (Backtracking(), BestFirst()):
+            calls.clear()
+            result = planner.plan(word, scores, rng=np.random.default_rng(1))
+            assert result.iterations == 0
+            assert "".join(name[0] for name in result.plan) == "testset"
+            assert len(calls) == 1
+
+
+def test_an_interchangeable_fellow_takes_its_place_in_the_completion() -> None:
+    assert with_first((3, 1, 2), 1) == (1, 3, 2)
+    assert with_first((3, 2), 1) == (1, 2)
+    assert remainder((1, 3, 2), 1) == (3, 2)
+    assert remainder((1, 3, 2), 3) == ()
+    assert remainder((), 3) == ()
 
 
 def test_backtracking_goes_back_from_dead_ends() -> None:
