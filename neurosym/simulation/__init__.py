@@ -7,18 +7,20 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from neurosym.simulation.client import Client, open_clients
+    from neurosym.simulation.looks import STYLES, VIEWS, Camera, Style
     from neurosym.simulation.oracle import PhysicsOracle
     from neurosym.simulation.picture_cache import cached_pictures
     from neurosym.simulation.render import PictureStudio, render_many, render_views
-    from neurosym.simulation.scene import PALETTE, STYLES, VIEWS, Camera, Style
+    from neurosym.simulation.scene import PALETTE
     from neurosym.simulation.world import Physics, World, stands
 
 _HOME = {
     "client": ("Client", "open_clients"),
+    "looks": ("STYLES", "VIEWS", "Camera", "Style"),
     "oracle": ("PhysicsOracle",),
     "picture_cache": ("cached_pictures",),
     "render": ("PictureStudio", "render_many", "render_views"),
-    "scene": ("PALETTE", "STYLES", "VIEWS", "Camera", "Style"),
+    "scene": ("PALETTE",),
     "world": ("Physics", "World", "stands"),
 }
 

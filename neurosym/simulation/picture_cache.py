@@ -19,8 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from neurosym.errors import InputError
+from neurosym.simulation.looks import VIEWS, Style, style_named
 from neurosym.simulation.render import CHUNK, Job, Progress, render_chunks
-from neurosym.simulation.scene import RGB, VIEWS, Scene, Style, scene_of, style_named
+from neurosym.simulation.scene import RGB, Scene, scene_of
 
 #: Raise it whenever the same request would give other pixels.
 RENDER_VERSION = 1

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from neurosym.errors import InputError
 from neurosym.geometry.assembly import Assembly
 from neurosym.simulation.client import Client
-from neurosym.simulation.scene import RGB, VIEWS, Camera, Scene, Style, draw_look, scene_of, style_named
+from neurosym.simulation.looks import VIEWS, Camera, Style, draw_look, style_named
+from neurosym.simulation.scene import RGB, Scene, scene_of
 
 #: Called with (done, total) while many pictures are made.
 Progress = Callable[[int, int], None]

@@ -6,7 +6,6 @@ because Bullet is less trustworthy with small bodies (5 cm cubes were judged wro
 
 from __future__ import annotations
 
-import hashlib
 import tempfile
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
@@ -20,6 +19,7 @@ from numpy.typing import NDArray
 
 from neurosym.errors import InputError, UnknownNameError
 from neurosym.simulation.client import Client
+from neurosym.simulation.collision_shapes import collision_shape
 from neurosym.simulation.solids import BodiesKind, RigidBody, matrix, quaternion, rigid_bodies, typical_extent
 
 if TYPE_CHECKING:
@@ -158,7 +158,7 @@ class World:
                 if key not in snapshot.frames:
                     continue
                 position, turn = snapshot.frames[key]
-                shape = self._shape(body, shapes, Path(folder))
+                shape = collision_shape(self._client, body, shapes, Path(folder))
                 number = p.createMultiBody(body.mass, shape, -1, position, turn, physicsClientId=c)
                 p.changeDynamics(
                     number, -1, lateralFriction=surface, localInertiaDiagonal=body.inertia.tolist(), physicsClientId=c
@@ -271,35 +271,6 @@ class World:
         stacked = np.concatenate(points)
         return np.stack([stacked.min(axis=0), stacked.max(axis=0)]) * self.unit
 
-    def _shape(self, body: RigidBody, shapes: dict[tuple[float, ...], int], folder: Path) -> int:
-        """A collision shape in the body's centre-of-mass frame; single boxes of one size share theirs."""
-        p, c = self._p, self._client.id
-        first = body.solids[0]
-        if len(body.solids) == 1 and first.half is not None:
-            size = tuple(first.half.tolist())
-            if size not in shapes:
-                shapes[size] = p.createCollisionShape(p.GEOM_BOX, halfExtents=size, physicsClientId=c)
-            return shapes[size]
-        kinds, halves, files, positions, turns = [], [], [], [], []
-        X_CW = np.linalg.inv(body.X_WC)
-        for solid in body.solids:
-            X_CB = X_CW @ solid.X_WB
-            kinds.append(p.GEOM_MESH if solid.half is None else p.GEOM_BOX)
-            halves.append([1.0] * 3 if solid.half is None else solid.half.tolist())
-            files.append("" if solid.half is not None else _obj(solid.vertices, folder))
-            positions.append(X_CB[:3, 3].tolist())
-            turns.append(quaternion(X_CB[:3, :3]).tolist())
-        return int(
-            p.createCollisionShapeArray(
-                shapeTypes=kinds,
-                halfExtents=halves,
-                fileNames=files,
-                collisionFramePositions=positions,
-                collisionFrameOrientations=turns,
-                physicsClientId=c,
-            )
-        )
-
 
 def _frame(body: RigidBody) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Position and quaternion, rounded: faces that touch exactly must not be parted by the last bits of a product.
@@ -310,19 +281,6 @@ def _frame(body: RigidBody) -> tuple[tuple[float, ...], tuple[float, ...]]:
         tuple((np.round(body.X_WC[:3, 3], 9) + 0.0).tolist()),
         tuple((np.round(quaternion(body.X_WC[:3, :3]), 12) + 0.0).tolist()),
     )
-
-
-def _obj(vertices: Array, folder: Path) -> str:
-    """Write corners as a file, since PyBullet joins meshes to a compound from files only.
-
-    It takes the hull of the corners, and it remembers files by name: the name is a digest of the content.
-    """
-    lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in vertices.tolist()]
-    lines += [f"f {i} {i + 1} {i + 2}" for i in range(1, len(vertices) - 1)]
-    text = "o hull\n" + "\n".join(lines) + "\n"
-    path = folder / f"{hashlib.sha256(text.encode()).hexdigest()}.obj"
-    path.write_text(text)
-    return str(path)
 
 
 def stands(

@@ -1,0 +1,66 @@
+"""Collision shapes for PyBullet: boxes, and compounds of boxes and convex hulls."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from neurosym.simulation.client import Client
+from neurosym.simulation.solids import RigidBody, quaternion
+
+Array = NDArray[np.float64]
+
+
+def collision_shape(client: Client, body: RigidBody, shapes: dict[tuple[float, ...], int], folder: Path) -> int:
+    """The number of a collision shape in the body's centre-of-mass frame.
+
+    Args:
+        client: where it is made.
+        body: what it is made of.
+        shapes: half edges -> shape, of single boxes made before: those of one size share theirs.
+        folder: for the files that PyBullet wants; they may go once the shape is there.
+    """
+    p: Any = client.p
+    c = client.id
+    first = body.solids[0]
+    if len(body.solids) == 1 and first.half is not None:
+        size = tuple(first.half.tolist())
+        if size not in shapes:
+            shapes[size] = p.createCollisionShape(p.GEOM_BOX, halfExtents=size, physicsClientId=c)
+        return shapes[size]
+    kinds, halves, files, positions, turns = [], [], [], [], []
+    X_CW = np.linalg.inv(body.X_WC)
+    for solid in body.solids:
+        X_CB = X_CW @ solid.X_WB
+        kinds.append(p.GEOM_MESH if solid.half is None else p.GEOM_BOX)
+        halves.append([1.0] * 3 if solid.half is None else solid.half.tolist())
+        files.append("" if solid.half is not None else _obj(solid.vertices, folder))
+        positions.append(X_CB[:3, 3].tolist())
+        turns.append(quaternion(X_CB[:3, :3]).tolist())
+    return int(
+        p.createCollisionShapeArray(
+            shapeTypes=kinds,
+            halfExtents=halves,
+            fileNames=files,
+            collisionFramePositions=positions,
+            collisionFrameOrientations=turns,
+            physicsClientId=c,
+        )
+    )
+
+
+def _obj(vertices: Array, folder: Path) -> str:
+    """Write corners as a file, since PyBullet joins meshes to a compound from files only.
+
+    It takes the hull of the corners, and it remembers files by name: the name is a digest of the content.
+    """
+    lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in vertices.tolist()]
+    lines += [f"f {i} {i + 1} {i + 2}" for i in range(1, len(vertices) - 1)]
+    text = "o hull\n" + "\n".join(lines) + "\n"
+    path = folder / f"{hashlib.sha256(text.encode()).hexdigest()}.obj"
+    path.write_text(text)
+    return str(path)

@@ -1,0 +1,172 @@
+"""How pictures look: cameras, light, and what chance may vary."""
+
+from __future__ import annotations
+
+import colorsys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from neurosym.errors import UnknownNameError
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Camera:
+    """A perspective camera that looks at the middle of the assembly.
+
+    Attributes:
+        azimuth: degrees about the vertical; 0 looks from +x, 90 from +y.
+        elevation: degrees above the horizontal; 90 looks straight down (with azimuth -90, +y is up in the picture).
+        distance: from the middle, in halves of the assembly's largest extent.
+        field_of_view: degrees, top to bottom.
+    """
+
+    azimuth: float
+    elevation: float
+    distance: float = 8.0
+    field_of_view: float = 21.0
+
+    def view_matrix(self) -> list[float]:
+        """World to camera, 16 numbers by columns (OpenGL's order)."""
+        a, e = np.radians([self.azimuth, self.elevation])
+        back = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
+        up = np.array([-np.sin(e) * np.cos(a), -np.sin(e) * np.sin(a), np.cos(e)])
+        V = np.eye(4)
+        V[:3, :3] = np.stack([np.cross(up, back), up, back])
+        V[2, 3] = -self.distance
+        return [float(x) for x in V.T.ravel()]
+
+    def projection_matrix(self) -> list[float]:
+        """Camera to clip space for square pictures, 16 numbers by columns."""
+        near, far = 0.5, 2 * self.distance
+        f = 1 / np.tan(np.radians(self.field_of_view) / 2)
+        depth, shift = (far + near) / (near - far), 2 * far * near / (near - far)
+        P = np.array([[f, 0, 0, 0], [0, f, 0, 0], [0, 0, depth, shift], [0, 0, -1, 0]])
+        return [float(x) for x in P.T.ravel()]
+
+
+#: The four views of the paper: from the top (+y up in the picture), then three sides, from +x, +y and -x, raised a
+#: little. Together they see all but the bottom and the side towards -y.
+VIEWS: tuple[Camera, ...] = (Camera(-90, 90), Camera(0, 15), Camera(90, 15), Camera(180, 15))
+
+
+@dataclass(frozen=True, slots=True)
+class Style:
+    """How pictures look, and how much chance varies that. Ranges are (least, most), drawn uniformly.
+
+    Attributes:
+        light_azimuth, light_elevation: degrees, where the light stands.
+        ambient, diffuse, specular: coefficients of the renderer's (Phong) light model.
+        shadow: chance that a picture has cast shadows (they take four times as long).
+        azimuth, elevation: degrees that each camera may turn or rise, either way.
+        distance: share that each camera may come nearer or go farther.
+        hue: share of the colour circle that each part's colour may shift, either way.
+        brightness: share that each part's colour may become darker or brighter.
+        noise: standard deviation of pixel noise, in grey levels of 255.
+    """
+
+    light_azimuth: tuple[float, float] = (40.0, 40.0)
+    light_elevation: tuple[float, float] = (55.0, 55.0)
+    ambient: tuple[float, float] = (0.65, 0.65)
+    diffuse: tuple[float, float] = (0.35, 0.35)
+    specular: tuple[float, float] = (0.0, 0.0)
+    shadow: float = 0.0
+    azimuth: float = 0.0
+    elevation: float = 0.0
+    distance: float = 0.0
+    hue: float = 0.0
+    brightness: float = 0.0
+    noise: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def is_random(self) -> bool:
+        """Whether two pictures of one assembly may differ."""
+        return self != Style(
+            (self.light_azimuth[0],) * 2,
+            (self.light_elevation[0],) * 2,
+            (self.ambient[0],) * 2,
+            (self.diffuse[0],) * 2,
+            (self.specular[0],) * 2,
+            round(self.shadow),
+        )
+
+
+STYLES: Mapping[str, Style] = {
+    "clean": Style(),
+    "varied": Style(
+        light_azimuth=(0.0, 360.0),
+        light_elevation=(25.0, 75.0),
+        ambient=(0.45, 0.65),
+        diffuse=(0.3, 0.55),
+        specular=(0.0, 0.2),
+        shadow=0.25,
+        azimuth=5.0,
+        elevation=4.0,
+        distance=0.05,
+        hue=0.025,
+        brightness=0.15,
+        noise=(0.0, 8.0),
+    ),
+}
+
+
+def style_named(style: str | Style) -> Style:
+    """A style by its name, or as it is.
+
+    Raises:
+        UnknownNameError: no style of that name.
+    """
+    if isinstance(style, Style):
+        return style
+    if style not in STYLES:
+        raise UnknownNameError("style of pictures", style, STYLES)
+    return STYLES[style]
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """One drawing of a style: everything that chance decides about one picture, but its noise."""
+
+    cameras: tuple[Camera, ...]
+    light: tuple[float, float, float]
+    ambient: float
+    diffuse: float
+    specular: float
+    shadow: bool
+    colours: Array
+    noise: float
+
+
+def draw_look(style: Style, cameras: Sequence[Camera], colours: Array, rng: np.random.Generator) -> Look:
+    """Draw a look; how many numbers are drawn depends on the counts of cameras and colours only.
+
+    Args:
+        style: what may vary.
+        cameras: the cameras to start from.
+        colours: float64 (n_parts, 3), RGB in 0..1.
+        rng: the only source of chance.
+    """
+    azimuth, elevation = np.radians([rng.uniform(*style.light_azimuth), rng.uniform(*style.light_elevation)])
+    direction = (np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation))
+    turned = tuple(
+        replace(
+            camera,
+            azimuth=camera.azimuth + style.azimuth * rng.uniform(-1, 1),
+            elevation=camera.elevation + style.elevation * rng.uniform(-1, 1),
+            distance=camera.distance * (1 + style.distance * rng.uniform(-1, 1)),
+        )
+        for camera in cameras
+    )
+    ambient, diffuse, specular = (rng.uniform(*r) for r in (style.ambient, style.diffuse, style.specular))
+    shadow, noise = bool(rng.random() < style.shadow), float(rng.uniform(*style.noise))
+    shifted = []
+    for rgb, hue, value in zip(colours, rng.uniform(-1, 1, len(colours)), rng.uniform(-1, 1, len(colours))):
+        h, s, v = colorsys.rgb_to_hsv(*(float(x) for x in rgb))
+        bright = min(1.0, v * (1 + style.brightness * value))
+        shifted.append(colorsys.hsv_to_rgb((h + style.hue * hue) % 1.0, s, bright))
+    x, y, z = (float(10 * x) for x in direction)
+    return Look(turned, (x, y, z), ambient, diffuse, specular, shadow, np.array(shifted), noise)
