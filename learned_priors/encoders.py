@@ -49,11 +49,21 @@ class SmallEncoder(Encoder):
 
     SIDE = 16
 
-    def __init__(self, shape: PictureShape, *, hidden: int = 192, view: int = 96, out_features: int = 256) -> None:
+    def __init__(
+        self,
+        shape: PictureShape,
+        *,
+        hidden: int = 192,
+        view: int = 96,
+        out_features: int = 256,
+        dropout: float = 0.2,
+    ) -> None:
         super().__init__()
         self.out_features = out_features
         self.each = nn.Sequential(nn.Linear(3 * self.SIDE**2, hidden), nn.ReLU(), nn.Linear(hidden, view), nn.ReLU())
-        self.all = nn.Sequential(nn.Linear(shape[0] * view, out_features), nn.ReLU())
+        self.all = nn.Sequential(
+            nn.Dropout(dropout), nn.Linear(shape[0] * view, out_features), nn.ReLU(), nn.Dropout(dropout)
+        )
 
     def prepare(self, pictures: Tensor) -> Tensor:
         views = pictures.flatten(0, 1).permute(0, 3, 1, 2).to(torch.float32)

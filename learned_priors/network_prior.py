@@ -103,17 +103,20 @@ class NetworkPrior(Prior):
             InputError: a problem has no pictures, pictures of another shape, or actions that the network does not know.
         """
         groups: dict[_Weights, list[int]] = {}
+        pictures: list[NDArray[np.uint8]] = []
         for k, problem in enumerate(problems):
-            if problem.observation is None:
+            observation = problem.observation
+            if observation is None:
                 raise InputError(
                     f"Expected pictures of the problem {problem.name!r}, from which this prior reads; it has none. "
-                    "Give it an observation, uint8 (V, H, W, 3), or plan with prior=None."
+                    "Give it some (problem.with_pictures), or plan with prior=None."
                 )
-            groups.setdefault(self._weights_for_problem(problem), []).append(k)
+            weights = self._weights_for_problem(problem)
+            pictures.append(_checked_pictures(np.asarray(observation), weights))
+            groups.setdefault(weights, []).append(k)
         found: dict[int, OrderScores] = {}
         for weights, index in groups.items():
-            pictures = [_checked_pictures(np.asarray(problems[k].observation), weights) for k in index]
-            for k, scores in zip(index, self._read(weights, np.stack(pictures))):
+            for k, scores in zip(index, self._read(weights, np.stack([pictures[k] for k in index]))):
                 left = scores.restricted(problems[k].actions)
                 found[k] = OrderScores(left.log_prob, left.actions, left.log_length, tuple(problems[k].classes))
         return [found[k] for k in range(len(problems))]

@@ -78,9 +78,9 @@ RECIPES = {
     recipe.name: recipe
     for recipe in (
         Recipe(
-            "sinkhorn", "dense", 128, "sinkhorn", TrainConfig(loss="sinkhorn", soft=True, epochs=60, least_steps=1500)
+            "sinkhorn", "dense", 128, "sinkhorn", TrainConfig(loss="sinkhorn", soft=True, epochs=80, least_steps=1500)
         ),
-        Recipe("tcn", "tcn", 32, "rows", TrainConfig(loss="rows", soft=True, epochs=60, least_steps=1500)),
+        Recipe("tcn", "tcn", 32, "rows", TrainConfig(loss="rows", soft=True, epochs=80, least_steps=1500)),
         Recipe(
             "sinkhorn-paper",
             "dense",
