@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import tempfile
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -91,9 +94,24 @@ def _legend(figure: Figure, with_paper: bool) -> None:
     from matplotlib.patches import Patch
 
     handles: list[Line2D | Patch] = [
-        Patch(color="0.6", label="share of runs"),
+        Patch(color="0.6", label="share of runs (row height: all)"),
         Line2D([], [], ls="", marker="o", ms=4, mfc="black", mec="white", label="mean"),
     ]
     if with_paper:
         handles.append(Line2D([], [], ls="", marker="D", ms=4, mfc="white", mec="black", label="mean in the paper"))
     figure.legend(handles=handles, loc="outside lower center", ncols=3, fontsize=7, frameon=False, handletextpad=0.4)
+
+
+def save(figure: Figure, path: str | Path, *, dpi: int = 200) -> Path:
+    """Write a figure to a file, whole or not at all; its folder is made. Returns the path."""
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=path.suffix or ".png")
+    os.close(handle)
+    try:
+        figure.savefig(temporary, dpi=dpi)
+        os.replace(temporary, path)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
+    return path

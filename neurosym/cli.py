@@ -1,0 +1,83 @@
+"""The command line. A command is one line here, and a function in `neurosym.commands`.
+
+Exit codes are in `neurosym.exit_codes`. Nothing heavy is imported before a command needs it.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+from typing import Annotated
+
+import typer
+
+from neurosym import __version__
+from neurosym.commands.compare import compare
+from neurosym.commands.learn import demos, train
+from neurosym.commands.plan import plan
+from neurosym.commands.survey import doctor, names
+from neurosym.errors import NeurosymError
+from neurosym.exit_codes import BAD_INPUT, EXIT_CODES, INTERRUPTED
+
+_TABLE = "Exit codes:\n\n" + "\n\n".join(f"{code}: {meaning}" for code, meaning in sorted(EXIT_CODES.items()))
+
+app = typer.Typer(
+    name="neurosym",
+    help="Plan in which order things go together or come apart: symbols, geometry and learned priors.",
+    epilog=_TABLE,
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+app.command("compare")(compare)
+app.command("plan")(plan)
+app.command("demos")(demos)
+app.command("train")(train)
+app.command("list")(names)
+app.command("doctor")(doctor)
+
+#: What typer and click exit with when an option is wrong; ours is `BAD_INPUT`.
+_USAGE = 2
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        print(f"neurosym {__version__}")
+        raise typer.Exit()
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Say the version, and exit.")
+    ] = False,
+) -> None:
+    pass
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command line, and leave with one of `EXIT_CODES`.
+
+    Args:
+        arguments: as typed after `neurosym`; None takes those of the process.
+    """
+    try:
+        app(args=None if arguments is None else list(arguments), prog_name="neurosym")
+    except SystemExit as left:
+        if left.code == _USAGE:
+            sys.exit(BAD_INPUT)
+        raise
+    except KeyboardInterrupt:
+        sys.exit(INTERRUPTED)
+    except BrokenPipeError:
+        # Whoever read our output has gone, `neurosym list | head -1` for instance: nothing to say, nothing to flush.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(0)
+    except (NeurosymError, OSError, NotImplementedError) as error:
+        print(f"neurosym: {error}", file=sys.stderr)
+        sys.exit(BAD_INPUT)
+
+
+if __name__ == "__main__":
+    main()

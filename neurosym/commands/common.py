@@ -1,0 +1,128 @@
+"""What commands share: options, consoles and progress bars."""
+
+from __future__ import annotations
+
+import inspect
+import json
+import os
+import sys
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from enum import Enum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from neurosym.family import Progress, ProblemFamily
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+#: Narrower than this, rich would cut columns off a comparison; a terminal may wrap the lines instead.
+TABLE_WIDTH = 112
+
+
+class Oracle(str, Enum):
+    """What answers attempts."""
+
+    geometry = "geometry"
+    physics = "physics"
+
+
+class Pictures(str, Enum):
+    """Style of the pictures a prior reads."""
+
+    clean = "clean"
+    varied = "varied"
+
+
+DomainName = Annotated[str, typer.Argument(metavar="DOMAIN", help="Problem family; `neurosym list` names them.")]
+PriorNames = Annotated[
+    list[str] | None,
+    typer.Option("--prior", metavar="Q", help="Name of a prior, a weights file, or `none`. May be repeated."),
+]
+CollapseRule = Annotated[
+    str | None, typer.Option("--collapse", metavar="RULE", help="Rule of collapse (soma: cubes, strict, rigid).")
+]
+OracleName = Annotated[Oracle, typer.Option("--oracle", help="What answers attempts.")]
+PictureStyle = Annotated[Pictures, typer.Option("--pictures", help="Style of the pictures.")]
+Split = Annotated[int, typer.Option("--split", min=0, metavar="S", help="Which random split into train and test.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object to stdout, and nothing else.")]
+
+
+def say(text: str) -> None:
+    """A word to the user, on stderr: stdout belongs to the answer."""
+    print(text, file=sys.stderr, flush=True)
+
+
+def console() -> Console:
+    """Stdout, wide enough for a table of ours."""
+    from rich.console import Console
+
+    out = Console(highlight=False)
+    return out if out.width >= TABLE_WIDTH else Console(highlight=False, width=TABLE_WIDTH)
+
+
+def cores() -> int:
+    """Processors that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def problem_options(family: ProblemFamily, **wanted: Any) -> dict[str, Any]:
+    """The options that were given, and the family's defaults for those that were not, as far as it takes them.
+
+    An option that was asked for is passed on even if the family does not take it, so that it is refused by name.
+    """
+    taken = inspect.signature(family.problem).parameters
+    found = {}
+    for name, value in wanted.items():
+        if value is not None:
+            found[name] = value
+        elif name in taken and taken[name].default is not inspect.Parameter.empty:
+            found[name] = taken[name].default
+    return found
+
+
+@contextmanager
+def progress_bar(what: str) -> Iterator[Progress]:
+    """A bar on stderr that goes away when it is done; nothing where stderr is no terminal."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
+    from rich.progress import Progress as Bars
+
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    err = Console(stderr=True)
+    with Bars(*columns, console=err, transient=True, disable=not err.is_terminal) as bars:
+        task = bars.add_task(what, total=None)
+        yield lambda done, total: bars.update(task, completed=done, total=total)
+
+
+def print_json(given: Any) -> None:
+    """One JSON object on stdout."""
+    print(json.dumps(given, indent=2, default=_plain), flush=True)
+
+
+def write_json(given: Any, path: Path) -> None:
+    """Write JSON, whole or not at all."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".tmp")
+    try:
+        with os.fdopen(handle, "w", encoding="utf-8") as file:
+            json.dump(given, file, indent=2, default=_plain)
+            file.write("\n")
+        os.replace(temporary, path)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
+
+
+def _plain(value: Any) -> Any:
+    """Arrays and numpy's numbers as JSON knows them; anything else as text."""
+    return value.tolist() if hasattr(value, "tolist") else str(value)
+
+
+def joined(names: Sequence[str]) -> str:
+    """'V, L and T'."""
+    return " and ".join(filter(None, [", ".join(names[:-1]), *names[-1:]]))

@@ -1,0 +1,171 @@
+"""`neurosym compare`: how many iterations each planner needs with each prior, beside the published figures."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from neurosym.commands.common import (
+    AsJson,
+    CollapseRule,
+    DomainName,
+    Oracle,
+    OracleName,
+    Pictures,
+    PictureStyle,
+    PriorNames,
+    Split,
+    console,
+    cores,
+    print_json,
+    problem_options,
+    progress_bar,
+    say,
+)
+from neurosym.errors import InputError, UnknownNameError
+from neurosym.family import ProblemFamily
+
+if TYPE_CHECKING:
+    from neurosym.benchmark import Comparison, Outcome
+    from neurosym.prior import Prior
+    from neurosym.reporting import Row
+
+PLANNERS = ("swap-repair", "backtracking", "best-first")
+PRIORS = ("none", "tcn-paper", "sinkhorn-paper", "tcn", "sinkhorn")
+PARTS = ("test", "train", "all")
+
+
+def compare(
+    domain: DomainName,
+    problems: Annotated[
+        str, typer.Option("--problems", metavar="test|train|all|N", help="Which; N means the first N of the test part.")
+    ] = "test",
+    split: Split = 0,
+    pictures: PictureStyle = Pictures.clean,
+    planner: Annotated[
+        list[str] | None, typer.Option("--planner", metavar="P", help="Name of a planner. May be repeated.")
+    ] = None,
+    prior: PriorNames = None,
+    collapse: CollapseRule = None,
+    oracle: OracleName = Oracle.geometry,
+    seeds: Annotated[int, typer.Option("--seeds", min=1, metavar="K", help="Solve each problem K times.")] = 1,
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="DIR", help="Folder for results.csv, iterations.png and runs.jsonl.")
+    ] = None,
+    as_json: AsJson = False,
+    workers: Annotated[
+        int | None, typer.Option("--workers", min=1, metavar="N", help="Processes; default one a core.")
+    ] = None,
+) -> None:
+    """Compare planners and priors on a domain's problems: one row a planner and prior.
+
+    Finished runs are kept in DIR/runs.jsonl: interrupted, or asked again with one more prior, it does only the rest.
+    Without --out, files go to out/compare-DOMAIN (with --json nowhere).
+    """
+    from neurosym.benchmark import Comparison, Outcome, image_blind, run
+    from neurosym.registry import load_domain
+    from neurosym.reporting import rows
+
+    family = load_domain(domain)
+    folder = out if out is not None or as_json else Path("out") / f"compare-{domain}"
+    processes = workers or cores()
+    comparison = Comparison(
+        domain=domain,
+        numbers=_numbers(family, problems, split),
+        planners=_once(planner or PLANNERS),
+        priors=_once(prior or PRIORS),
+        options=problem_options(family, collapse=collapse, pictures=_style(family, pictures)),
+        oracle=oracle.value,
+        seeds=seeds,
+    )
+    comparison, scores = _scores(comparison, asked=bool(prior), workers=processes)
+    with progress_bar("planning") as progress:
+        journal = folder / "runs.jsonl" if folder else None
+        runs = run(comparison, scores, workers=processes, journal=journal, progress=progress)
+    blind = image_blind(comparison, split=split)
+    outcome = Outcome(comparison, runs, *(blind or ()))
+    table = rows(outcome)
+    if folder:
+        _write(outcome, table, folder)
+    if as_json:
+        print_json({"rows": table})
+        return
+    _show(outcome, table, family, folder)
+
+
+def _numbers(family: ProblemFamily, problems: str, split: int) -> tuple[int, ...]:
+    if problems.isdecimal() and int(problems) > 0:
+        test = tuple(family.numbers("test", split=split))
+        if int(problems) > len(test):
+            raise InputError(f"Expected at most {len(test)} problems, as many as the test part has; got {problems}.")
+        return test[: int(problems)]
+    if problems not in PARTS:
+        raise UnknownNameError("part", problems, PARTS, hint="A number N above 0 takes the first N of the test part.")
+    return tuple(family.numbers(problems, split=split))
+
+
+def _style(family: ProblemFamily, pictures: Pictures) -> str | None:
+    """A family whose problems have no such option is not told the default."""
+    return None if pictures is Pictures.clean else pictures.value
+
+
+def _once(names: Sequence[str]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(names))
+
+
+def _scores(comparison: Comparison, *, asked: bool, workers: int) -> tuple[Comparison, dict[str, Any]]:
+    """Load the priors and ask them; of the default ones, those that do not know this domain are left out."""
+    import dataclasses
+
+    from neurosym.benchmark import NO_PRIOR, ask_priors
+    from neurosym.registry import load_prior
+
+    loaded: dict[str, Prior] = {}
+    left: list[str] = []
+    probe = dataclasses.replace(comparison, numbers=comparison.numbers[:1], priors=(NO_PRIOR,))
+    for name in comparison.priors:
+        if name != NO_PRIOR:
+            try:
+                loaded[name] = load_prior(name)
+                if not asked:
+                    ask_priors(dataclasses.replace(probe, priors=(name,)), loaded=loaded)
+            except InputError as error:
+                if asked:
+                    raise
+                say(f"Left out: the prior {name}. {error}")
+                continue
+        left.append(name)
+    comparison = dataclasses.replace(comparison, priors=tuple(left))
+    with progress_bar("taking pictures") as progress:
+        return comparison, ask_priors(comparison, workers=workers, loaded=loaded, progress=progress)
+
+
+def _write(outcome: Outcome, table: list[Row], folder: Path) -> None:
+    from neurosym.plotting import iterations_figure, save
+    from neurosym.reporting import write_csv
+
+    write_csv(table, folder / "results.csv")
+    save(iterations_figure(outcome), folder / "iterations.png")
+
+
+def _show(outcome: Outcome, given: list[Row], family: ProblemFamily, folder: Path | None) -> None:
+    from neurosym.reporting import table
+
+    comparison = outcome.comparison
+    out = console()
+    options = ", ".join(f"{key} {value}" for key, value in comparison.options.items())
+    seeds = f", {comparison.seeds} seeds each" if comparison.seeds > 1 else ""
+    out.print(f"{comparison.domain}: {len(comparison.numbers)} problems{seeds}; {options}, oracle {comparison.oracle}")
+    out.print(table(given))
+    if outcome.image_blind is not None:
+        out.print(
+            f"Without looking at any picture: the best fixed order ({' '.join(outcome.image_blind_order)}) "
+            f"fails on {100 * outcome.image_blind:.1f}% of them."
+        )
+    if any(row["published"] for row in given):
+        out.print(f"Paper: {family.reference}. Its 'random' stands beside 'none'.")
+    if folder:
+        out.print(f"Written: {folder / 'results.csv'}, {folder / 'iterations.png'}", soft_wrap=True)

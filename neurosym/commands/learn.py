@@ -1,0 +1,118 @@
+"""`neurosym demos` and `neurosym train`: write demonstrations, and train a prior on them."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from neurosym.commands.common import DomainName, Pictures, PictureStyle, Split, progress_bar, say
+from neurosym.errors import InputError
+
+if TYPE_CHECKING:
+    from neurosym.demonstrations import Demonstrations
+
+#: Names of priors that end so learn from the paper's demonstrations, all others from the full ones.
+PAPER = "-paper"
+
+
+def demos(
+    domain: DomainName,
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="Where to write them: a file in .npz.")],
+    recipe: Annotated[str, typer.Option("--recipe", metavar="full|paper", help="Which labels.")] = "full",
+    part: Annotated[str, typer.Option("--part", metavar="train|test|all", help="Of which problems.")] = "train",
+    split: Split = 0,
+    pictures: PictureStyle = Pictures.clean,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Of the pictures.")] = 0,
+) -> None:
+    """Write demonstrations of a domain: pictures, orders and shares of valid orders."""
+    _check_suffix(out, ".npz")
+    made = _demonstrations(domain, part, split, recipe, pictures, seed)
+    made.save(out)
+    m, views, height, width, _ = made.pictures.shape
+    shares = "with" if made.marginals is not None else "without"
+    print(f"{out}: {m} demonstrations of {len(made.actions)} actions, {views} views of {height} x {width}, {shares} shares")
+
+
+def train(
+    domain: DomainName,
+    prior: Annotated[str, typer.Option("--prior", metavar="Q", help="sinkhorn, tcn, sinkhorn-paper or tcn-paper.")],
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="The weights: a file in .safetensors.")],
+    demos_file: Annotated[
+        Path | None, typer.Option("--demos", metavar="FILE", help="Demonstrations of your own; default the domain's.")
+    ] = None,
+    split: Split = 0,
+    seed: Annotated[int, typer.Option("--seed", min=0, metavar="K", help="Of the pictures and the training.")] = 0,
+    pictures: PictureStyle = Pictures.clean,
+    epochs: Annotated[int | None, typer.Option("--epochs", min=1, help="Default the recipe's.")] = None,
+    device: Annotated[str, typer.Option("--device", help="cpu or cuda.")] = "cpu",
+    resume: Annotated[bool, typer.Option("--resume/--no-resume", help="Go on from a run that was killed.")] = True,
+) -> None:
+    """Train a prior, with early figures; a run that was killed goes on where it was."""
+    from neurosym.registry import load_domain, load_prior
+
+    _check_suffix(out, ".safetensors")
+    load_domain(domain)
+    learner: Any = load_prior(prior)
+    if not (hasattr(learner, "fit") and hasattr(learner, "save")):
+        raise InputError(f"Expected a prior that can be trained; {prior!r} cannot (it has no fit and save).")
+    if demos_file is not None:
+        from neurosym.demonstrations import Demonstrations
+
+        given = Demonstrations.load(demos_file)
+    else:
+        given = _demonstrations(domain, "train", split, "paper" if prior.endswith(PAPER) else "full", pictures, seed)
+    checkpoint = out.with_suffix(".checkpoint")
+    if checkpoint.exists():
+        say(f"Going on from {checkpoint}." if resume else f"Starting over; {checkpoint} is replaced.")
+    out.parent.mkdir(parents=True, exist_ok=True)
+    with warnings.catch_warnings():
+        warnings.showwarning = lambda message, *_, **__: say(f"Note: {message}")
+        _fit(learner, given, seed=seed, epochs=epochs, device=device, checkpoint=checkpoint, resume=resume)
+    learner.save(out)
+    checkpoint.unlink(missing_ok=True)
+    figures = learner.header.get("training", {}) if hasattr(learner, "header") else {}
+    took = f" in {figures['seconds']:.1f} s" if "seconds" in figures else ""
+    print(f"{out}: {prior}, trained on {len(given)} demonstrations{took}, {out.stat().st_size / 1024:.0f} KiB")
+
+
+def _fit(learner: Any, given: Demonstrations, **options: Any) -> None:
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    err = Console(stderr=True)
+    columns = (BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(), TextColumn("{task.description}"))
+    with Progress(*columns, console=err, disable=not err.is_terminal) as bars:
+        task = bars.add_task("the first epoch", total=None)
+
+        def show(now: Any) -> None:
+            held = "" if now.held_out_loss is None else f", held out {now.held_out_loss:.4f}"
+            if now.held_out_whole_order_accuracy is not None:
+                held += f" ({100 * now.held_out_whole_order_accuracy:.0f}% of orders right)"
+            text = f"loss {now.train_loss:.4f}{held}"
+            bars.update(task, completed=now.epoch, total=now.epochs, description=text)
+            # Where there is no terminal, a line at every tenth of the way.
+            if bars.disable and (now.epoch * 10) // now.epochs > ((now.epoch - 1) * 10) // now.epochs:
+                say(f"epoch {now.epoch}/{now.epochs}: {text}")
+
+        learner.fit(given, progress=show, **options)
+
+
+def _demonstrations(
+    domain: str, part: str, split: int, recipe: str, pictures: Pictures, seed: int
+) -> Demonstrations:
+    from neurosym.registry import load_domain
+
+    family = load_domain(domain)
+    with progress_bar("demonstrations") as progress:
+        return family.demonstrations(
+            part, split=split, recipe=recipe, style=pictures.value, seed=seed, progress=progress
+        )
+
+
+def _check_suffix(path: Path, suffix: str) -> None:
+    """Said before the work, not after it."""
+    if path.suffix != suffix:
+        raise InputError(f"Expected a file name that ends in {suffix}; got {path.name!r}.")

@@ -1,0 +1,214 @@
+"""`neurosym plan`: one problem, its plan step by step, and the reason for each refusal on the way."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+import typer
+
+from neurosym.commands.common import (
+    AsJson,
+    CollapseRule,
+    DomainName,
+    Oracle,
+    OracleName,
+    Pictures,
+    PictureStyle,
+    joined,
+    print_json,
+    problem_options,
+    write_json,
+)
+from neurosym.errors import InputError
+from neurosym.family import ProblemFamily
+
+if TYPE_CHECKING:
+    from neurosym.language.domain import Problem
+    from neurosym.planner import PlanResult
+
+#: Of the file that --out writes. Raise it when a reader of the old one would go wrong.
+SCHEMA = 1
+
+#: Refusals shown at the end of a search that found nothing; --out keeps all.
+LAST_REFUSALS = 12
+
+
+def plan(
+    domain: DomainName,
+    number: Annotated[int | None, typer.Option("--problem", metavar="N", help="Number of the problem.")] = None,
+    cells: Annotated[
+        Path | None, typer.Option("--cells", metavar="FILE", help='A puzzle of your own: JSON {"name": [[x,y,z], ...]}.')
+    ] = None,
+    planner: Annotated[
+        str | None, typer.Option("--planner", metavar="P", help="Default backtracking; with --k best-first.")
+    ] = None,
+    prior: Annotated[
+        str, typer.Option("--prior", metavar="Q", help="Name of a prior, a weights file, or `none`.")
+    ] = "none",
+    collapse: CollapseRule = None,
+    oracle: OracleName = Oracle.geometry,
+    pictures: PictureStyle = Pictures.clean,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Breaks ties; the same seed gives the same plan.")] = 0,
+    seconds: Annotated[float | None, typer.Option("--seconds", help="Budget: wall-clock time.")] = None,
+    attempts: Annotated[int | None, typer.Option("--attempts", help="Budget: questions to the oracle.")] = None,
+    expansions: Annotated[int | None, typer.Option("--expansions", help="Budget: states expanded.")] = None,
+    k: Annotated[int | None, typer.Option("--k", metavar="K", help="The K best plans, the likeliest first.")] = None,
+    before: Annotated[
+        list[str] | None, typer.Option("--before", metavar="A,B", help="A must come before B. May be repeated.")
+    ] = None,
+    removed: Annotated[
+        list[str] | None, typer.Option("--removed", metavar="V", help="Is gone already. May be repeated.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="Keep it all as JSON.")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Plan one problem, and show each step with the refusals that led to it."""
+    from neurosym.benchmark import NO_PRIOR
+    from neurosym.pipeline import plans, solve
+    from neurosym.planner import Budget
+    from neurosym.registry import load_domain
+
+    family = load_domain(domain)
+    options = problem_options(
+        family,
+        collapse=collapse,
+        pictures=None if pictures is Pictures.clean else pictures.value,
+        before=[_pair(text) for text in before] if before else None,
+        removed=removed or None,
+    )
+    problem = _problem(family, number, cells, options)
+    chosen = planner or ("backtracking" if k is None else "best-first")
+    budget = Budget(seconds=seconds, attempts=attempts, expansions=expansions)
+    settings: dict[str, Any] = {
+        "planner": chosen,
+        "prior": None if prior == NO_PRIOR else prior,
+        "budget": budget,
+        "oracle": oracle.value,
+    }
+    results = plans(problem, k=k, rng=np.random.default_rng(seed), **settings)
+    if not results:
+        # The k best of none: ask for one, to be told why there is none.
+        results = [solve(problem, rng=np.random.default_rng(seed), **settings)]
+    answer = {
+        **_header(domain, problem, number, options),
+        **settings,
+        "budget": vars(budget),
+        "seed": seed,
+        **_result(results[0]),
+    }
+    if k is not None:
+        answer["plans"] = [_result(result) for result in results]
+    if out is not None:
+        write_json(answer, out)
+    if as_json:
+        print_json(answer)
+    else:
+        _show(problem, results, answer)
+    raise typer.Exit(results[0].status.exit_code)
+
+
+def _problem(family: ProblemFamily, number: int | None, cells: Path | None, options: dict[str, Any]) -> Problem:
+    if (number is None) == (cells is None):
+        raise InputError("Expected either --problem N or --cells FILE, one of them.")
+    if cells is None:
+        try:
+            return family.problem(number, **options)
+        except TypeError as error:
+            raise InputError(f"Expected options that problems of {family.name!r} take; {error}.") from None
+    make = getattr(family, "problem_from_cells", None)
+    if make is None:
+        raise InputError(f"Expected a domain of polycube puzzles (soma) for --cells; {family.name!r} is none.")
+    try:
+        given = json.loads(cells.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise InputError(f'Expected JSON {{"name": [[x, y, z], ...]}} in {cells}; got: {error}.') from None
+    if not isinstance(given, dict) or not all(isinstance(own, list) for own in given.values()):
+        raise InputError(f'Expected JSON {{"name": [[x, y, z], ...]}} in {cells}; got something else.')
+    problem: Problem = make(given, **options)
+    return problem
+
+
+def _pair(text: str) -> tuple[str, str]:
+    names = [name.strip() for name in text.split(",")]
+    if len(names) != 2 or not all(names):
+        raise InputError(f"Expected --before A,B: two names with a comma between; got {text!r}.")
+    return names[0], names[1]
+
+
+def _header(domain: str, problem: Problem, number: int | None, options: dict[str, Any]) -> dict[str, Any]:
+    from neurosym import __version__
+
+    named = {"schema": SCHEMA, "neurosym": __version__, "domain": domain, "problem": problem.name, "number": number}
+    return {**named, "actions": list(problem.actions), "options": options}
+
+
+def _result(result: PlanResult) -> dict[str, Any]:
+    hows = result.how or (None,) * len(result.plan or ())
+    return {
+        "status": result.status.name,
+        "sentence": result.status.sentence,
+        "plan": None if result.plan is None else list(result.plan),
+        "steps": [{"action": a, "how": how} for a, how in zip(result.plan or (), hows)],
+        "best_prefix": list(result.best_prefix),
+        "refusals": [
+            {"after": list(r.after), "action": r.action, "reason": r.reason, "because": list(r.because)}
+            for r in result.blame
+        ],
+        "iterations": result.iterations,
+        "expansions": result.expansions,
+        "attempts": result.attempts,
+        "seconds": result.seconds,
+        "cost": result.cost,
+    }
+
+
+def _show(problem: Problem, results: Sequence[PlanResult], answer: dict[str, Any]) -> None:
+    best = results[0]
+    advice = f"with the prior {answer['prior']}" if answer["prior"] else "without a prior"
+    print(f"{problem.name}: {answer['planner']} {advice}, oracle {answer['oracle']}")
+    if best.plan is not None:
+        _show_steps(best.plan, best)
+    print(best.status.sentence)
+    if best.plan is None:
+        so_far = joined(best.best_prefix) or "nothing"
+        print(f"The longest prefix that works: {so_far} ({len(best.best_prefix)} of {len(problem.actions)}).")
+        print(f"The last of {best.iterations} refusals:" if best.blame else "Nothing was refused.")
+        for refusal in best.blame[-LAST_REFUSALS:]:
+            print(f"  after {joined(refusal.after) or 'nothing'}, not {refusal.action}: {refusal.reason}")
+    counts = f"{best.iterations} iterations, {best.attempts} attempts, {best.expansions} expansions"
+    print(f"{counts}, {1000 * best.seconds:.1f} ms")
+    for rank, other in enumerate(results[1:], 2):
+        cost = "" if other.cost is None else f"  (cost {other.cost:.3f} nats)"
+        print(f"plan {rank}: {' '.join(other.plan or ())}{cost}")
+
+
+def _show_steps(steps: Sequence[str], result: PlanResult) -> None:
+    """The plan and the refusals in the order in which they came; those off the plan's path say after what."""
+    hows = result.how or (None,) * len(steps)
+    shown = 0
+
+    def advance(to: int) -> int:
+        for i in range(shown, to):
+            print(f"  {i + 1}. {steps[i]}{_how(hows[i])}")
+        return max(shown, to)
+
+    for refusal in result.blame:
+        depth = len(refusal.after)
+        on_path = tuple(steps[:depth]) == refusal.after
+        if on_path:
+            shown = advance(depth)
+        elsewhere = "" if on_path and depth == shown else f" (after {joined(refusal.after) or 'nothing'})"
+        print(f"     not {refusal.action}{elsewhere}: {refusal.reason}")
+    advance(len(steps))
+
+
+def _how(how: Any) -> str:
+    if how is None:
+        return ""
+    if isinstance(how, tuple | list) or hasattr(how, "tolist"):
+        return f"  along ({', '.join(f'{float(v):g}' for v in how)})" if len(how) == 3 else f"  {how}"
+    return f"  {how}"
