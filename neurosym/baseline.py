@@ -1,4 +1,4 @@
-"""The image-blind baseline: one fixed order for every problem. A prior that looks must beat it to have seen anything."""
+"""The image-blind baseline: one fixed order for every problem. A prior that looks must beat it."""
 
 from __future__ import annotations
 

@@ -9,10 +9,10 @@ from __future__ import annotations
 import hashlib
 import inspect
 import zlib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -26,6 +26,9 @@ from neurosym.planner import Budget
 from neurosym.prior import OrderScores, Prior
 from neurosym.problem import SearchProblem
 from neurosym.registry import load_domain, load_planner, load_prior
+
+if TYPE_CHECKING:
+    from neurosym.language.domain import Problem
 
 #: The name of planning without a prior, in tables and on the command line.
 NO_PRIOR = "none"
@@ -118,23 +121,39 @@ class Outcome:
 
 
 def ask_priors(
-    comparison: Comparison, *, workers: int = 1, loaded: Mapping[str, Prior] | None = None, progress: Progress | None = None
+    comparison: Comparison,
+    *,
+    workers: int = 1,
+    loaded: Mapping[str, Prior] | None = None,
+    leave_out: Callable[[str, InputError], None] | None = None,
+    progress: Progress | None = None,
 ) -> dict[str, list[OrderScores] | None]:
-    """Each prior's scores for all problems, asked in one batch; pictures are taken once, when a prior may look.
+    """Each prior's scores for all problems, asked in one batch; pictures are taken once.
 
     Args:
         loaded: priors that are loaded already, by their names in the comparison.
+        leave_out: called with the name of a prior that does not know these problems, and what it said; the prior is
+            then missing in the answer. None lets the error pass.
+        progress: called with (done, total) pictures.
     """
     family = load_domain(comparison.domain)
-    priors = {name: (loaded or {}).get(name) or load_prior(name) for name in comparison.priors if name != NO_PRIOR}
-    found: dict[str, list[OrderScores] | None] = dict.fromkeys(comparison.priors)
-    if priors:
-        problems = [family.problem(n, **comparison.options) for n in comparison.numbers]
-        # Whether a prior looks at pictures is its own business; these two are known not to.
-        if set(priors) - {"uniform", "random"}:
-            problems = family.observed(problems, workers=workers, progress=progress)
-        for name, prior in priors.items():
-            found[name] = prior.scores(problems)
+    found: dict[str, list[OrderScores] | None] = {}
+    problems: list[Problem] | None = None
+    for name in comparison.priors:
+        if name == NO_PRIOR:
+            found[name] = None
+            continue
+        if problems is None:
+            problems = [family.problem(n, **comparison.options) for n in comparison.numbers]
+            # Whether a prior looks at pictures is its own business; these two are known not to.
+            if set(comparison.priors) - {NO_PRIOR, "uniform", "random"}:
+                problems = family.observed(problems, workers=workers, progress=progress)
+        try:
+            found[name] = load_prior((loaded or {}).get(name, name)).scores(problems)
+        except InputError as error:
+            if leave_out is None:
+                raise
+            leave_out(name, error)
     return found
 
 
@@ -261,8 +280,6 @@ class _FirstOrders:
 
 def _key(comparison: Comparison, cell: Cell, number: int, scores: OrderScores | None) -> str:
     """What decides a run. The scores themselves are part of it: a prior that was trained anew is another prior."""
-    table = "" if scores is None else hashlib.sha256(scores.log_prob.tobytes() + repr(scores.actions).encode()).hexdigest()
-    return key_of(
-        [RUNS_VERSION, __version__, comparison.domain, number, dict(comparison.options), comparison.oracle]
-        + [asdict(comparison.budget), *cell, table]
-    )
+    table = b"" if scores is None else scores.log_prob.tobytes() + repr(scores.actions).encode()
+    setting = (comparison.domain, number, dict(comparison.options), comparison.oracle, asdict(comparison.budget))
+    return key_of([RUNS_VERSION, __version__, *setting, *cell, hashlib.sha256(table).hexdigest()])

@@ -11,8 +11,6 @@ from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 
-from neurosym.errors import NeurosymError
-
 DISTRIBUTION = "neurosym-assembly"
 #: The packages that make up this library; on PyPI other projects hold two of these names.
 PACKAGES = ("neurosym", "domains", "planners", "learned_priors")
@@ -62,9 +60,9 @@ def works(name: str, check: Callable[[], str]) -> Finding:
     """Call a check; whatever it raises is the finding."""
     try:
         return Finding("works", name, True, check())
-    except (Exception, NeurosymError) as error:
-        said = f"{type(error).__name__}: {error}"
-        return Finding("works", name, False, said, f"Install it again: pip install --force-reinstall {_PACKAGE.get(name, name)}")
+    except Exception as error:  # whatever a broken installation raises is what the user needs to read
+        remedy = f"Install it again: pip install --force-reinstall {_PACKAGE.get(name, name)}"
+        return Finding("works", name, False, f"{type(error).__name__}: {error}", remedy)
 
 
 def fcl_works() -> str:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from neurosym.benchmark import NO_PRIOR, Outcome, Run
+from neurosym.files import replacing
 from neurosym.reporting import published
 
 if TYPE_CHECKING:
@@ -55,7 +54,8 @@ def iterations_figure(outcome: Outcome) -> Figure:
         _dress(axis, planner, priors, last)
     axes[-1].set_xlabel("iterations (refusals before the plan)", fontsize=8)
     counts = f"{len(comparison.numbers)} problems" + (f" × {comparison.seeds} seeds" if comparison.seeds > 1 else "")
-    said = ", ".join(filter(None, [comparison.domain, str(comparison.options.get("collapse") or ""), comparison.oracle]))
+    rule = str(comparison.options.get("collapse") or "")
+    said = ", ".join(filter(None, [comparison.domain, rule, comparison.oracle]))
     figure.suptitle(f"{said}: n = {counts}", fontsize=8)
     _legend(figure, marked)
     return figure
@@ -104,14 +104,6 @@ def _legend(figure: Figure, with_paper: bool) -> None:
 
 def save(figure: Figure, path: str | Path, *, dpi: int = 200) -> Path:
     """Write a figure to a file, whole or not at all; its folder is made. Returns the path."""
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=path.suffix or ".png")
-    os.close(handle)
-    try:
+    with replacing(path) as temporary:
         figure.savefig(temporary, dpi=dpi)
-        os.replace(temporary, path)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
-    return path
+    return Path(path)

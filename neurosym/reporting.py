@@ -1,10 +1,8 @@
-"""What a comparison says: one row a planner and prior, as a table, as CSV, as JSON, with the published figures beside."""
+"""What a comparison says: one row a planner and prior, beside the published figures, as a table or as CSV."""
 
 from __future__ import annotations
 
 import csv
-import os
-import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from neurosym.benchmark import NO_PRIOR, Outcome, Run
+from neurosym.files import replacing
 from neurosym.registry import load_domain
 
 if TYPE_CHECKING:
@@ -77,9 +76,9 @@ def table(given: Sequence[Row]) -> Table:
     from rich import box
     from rich.table import Table
 
-    columns = ("planner", "prior", "solved", "initial\nfailures %", "iterations\nmean ± sd", "expan-\nsions", "attempts")
-    made = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    for column in (*columns, "ms a\nproblem", "paper:\nfailures %", "paper:\niterations"):
+    made = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1))
+    counts = ("solved", "initial\nfailures %", "iterations\nmean ± sd", "expan-\nsions", "at-\ntempts", "ms a\nproblem")
+    for column in ("planner", "prior", *counts, "paper:\nfailures %", "paper:\niterations"):
         made.add_column(column, justify="left" if column in ("planner", "prior") else "right", no_wrap=True)
     for i, row in enumerate(given):
         made.add_row(*cells(row), end_section=i + 1 < len(given) and given[i + 1]["prior"] != row["prior"])
@@ -121,17 +120,10 @@ def write_csv(given: Sequence[Row], path: str | Path) -> Path:
             mean, deviation = paper.get(key) or ("", "")
             plain |= {f"published_{key}_mean": mean, f"published_{key}_std": deviation}
         flat.append(plain)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".tmp")
-    try:
-        with os.fdopen(handle, "w", newline="", encoding="utf-8") as file:
-            writer = csv.DictWriter(file, fieldnames=list(flat[0]))
-            writer.writeheader()
-            writer.writerows(flat)
-        os.replace(temporary, path)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
+    with replacing(path) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, fieldnames=list(flat[0]))
+        writer.writeheader()
+        writer.writerows(flat)
     return path
 
 

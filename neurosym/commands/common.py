@@ -6,32 +6,32 @@ import inspect
 import json
 import os
 import sys
-import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from enum import Enum
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from neurosym.family import Progress, ProblemFamily
+from neurosym.family import ProblemFamily, Progress
+from neurosym.files import write_text
 
 if TYPE_CHECKING:
     from rich.console import Console
 
 #: Narrower than this, rich would cut columns off a comparison; a terminal may wrap the lines instead.
-TABLE_WIDTH = 112
+TABLE_WIDTH = 118
 
 
-class Oracle(str, Enum):
+class Oracle(StrEnum):
     """What answers attempts."""
 
     geometry = "geometry"
     physics = "physics"
 
 
-class Pictures(str, Enum):
+class Pictures(StrEnum):
     """Style of the pictures a prior reads."""
 
     clean = "clean"
@@ -106,16 +106,7 @@ def print_json(given: Any) -> None:
 
 def write_json(given: Any, path: Path) -> None:
     """Write JSON, whole or not at all."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".tmp")
-    try:
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            json.dump(given, file, indent=2, default=_plain)
-            file.write("\n")
-        os.replace(temporary, path)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
+    write_text(path, json.dumps(given, indent=2, default=_plain) + "\n")
 
 
 def _plain(value: Any) -> Any:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -30,7 +31,6 @@ from neurosym.family import ProblemFamily
 
 if TYPE_CHECKING:
     from neurosym.benchmark import Comparison, Outcome
-    from neurosym.prior import Prior
     from neurosym.reporting import Row
 
 PLANNERS = ("swap-repair", "backtracking", "best-first")
@@ -86,7 +86,7 @@ def compare(
         journal = folder / "runs.jsonl" if folder else None
         runs = run(comparison, scores, workers=processes, journal=journal, progress=progress)
     blind = image_blind(comparison, split=split)
-    outcome = Outcome(comparison, runs, *(blind or ()))
+    outcome = Outcome(comparison, runs, *(blind or (None, ())))
     table = rows(outcome)
     if folder:
         _write(outcome, table, folder)
@@ -117,30 +117,15 @@ def _once(names: Sequence[str]) -> tuple[str, ...]:
 
 
 def _scores(comparison: Comparison, *, asked: bool, workers: int) -> tuple[Comparison, dict[str, Any]]:
-    """Load the priors and ask them; of the default ones, those that do not know this domain are left out."""
-    import dataclasses
+    """What the priors say; of the default ones, those that do not know this domain are left out."""
+    from neurosym.benchmark import ask_priors
 
-    from neurosym.benchmark import NO_PRIOR, ask_priors
-    from neurosym.registry import load_prior
+    def leave_out(name: str, error: InputError) -> None:
+        say(f"Left out: the prior {name}. {error}")
 
-    loaded: dict[str, Prior] = {}
-    left: list[str] = []
-    probe = dataclasses.replace(comparison, numbers=comparison.numbers[:1], priors=(NO_PRIOR,))
-    for name in comparison.priors:
-        if name != NO_PRIOR:
-            try:
-                loaded[name] = load_prior(name)
-                if not asked:
-                    ask_priors(dataclasses.replace(probe, priors=(name,)), loaded=loaded)
-            except InputError as error:
-                if asked:
-                    raise
-                say(f"Left out: the prior {name}. {error}")
-                continue
-        left.append(name)
-    comparison = dataclasses.replace(comparison, priors=tuple(left))
     with progress_bar("taking pictures") as progress:
-        return comparison, ask_priors(comparison, workers=workers, loaded=loaded, progress=progress)
+        scores = ask_priors(comparison, workers=workers, leave_out=None if asked else leave_out, progress=progress)
+    return dataclasses.replace(comparison, priors=tuple(scores)), scores
 
 
 def _write(outcome: Outcome, table: list[Row], folder: Path) -> None:

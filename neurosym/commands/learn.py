@@ -33,7 +33,8 @@ def demos(
     made.save(out)
     m, views, height, width, _ = made.pictures.shape
     shares = "with" if made.marginals is not None else "without"
-    print(f"{out}: {m} demonstrations of {len(made.actions)} actions, {views} views of {height} x {width}, {shares} shares")
+    sizes = f"{views} views of {height} x {width}"
+    print(f"{out}: {m} demonstrations of {len(made.actions)} actions, {sizes}, {shares} shares of valid orders")
 
 
 def train(

@@ -41,7 +41,7 @@ def plan(
     domain: DomainName,
     number: Annotated[int | None, typer.Option("--problem", metavar="N", help="Number of the problem.")] = None,
     cells: Annotated[
-        Path | None, typer.Option("--cells", metavar="FILE", help='A puzzle of your own: JSON {"name": [[x,y,z], ...]}.')
+        Path | None, typer.Option("--cells", metavar="FILE", help='A puzzle of yours: JSON {"name": [[x,y,z], ...]}.')
     ] = None,
     planner: Annotated[
         str | None, typer.Option("--planner", metavar="P", help="Default backtracking; with --k best-first.")
