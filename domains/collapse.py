@@ -156,8 +156,8 @@ def check_standing(world: Assembly, rule: str) -> None:
             if world.X_WB[cube, 2, 3] - z > world.smallest_extent / 2:
                 at = ", ".join(f"{v:.3g}" for v in world.X_WB[cube, :3, 3])
                 raise AssemblyError(
-                    f"Piece {world.names[world.owners[cube]]!r}: its cube at ({at}) is floating. Under the rule 'cubes' "
-                    "every cube is a body of its own and would fall at once; use collapse='rigid' or 'strict'."
+                    f"Piece {world.names[world.owners[cube]]!r}: its cube ({at}) is floating. Under the rule 'cubes' "
+                    "each cube is a body of its own and would fall at once; use collapse='rigid' or 'strict'."
                 )
     carried: set[int] = set()
     for contact in world.contacts():
@@ -168,6 +168,6 @@ def check_standing(world: Assembly, rule: str) -> None:
     for number, name in enumerate(world.names):
         if number not in carried:
             raise AssemblyError(
-                f"Piece {name!r} is floating: it stands neither on another piece nor on the table (z is up, the table is "
-                f"at z = {world.ground:g}). Move it down, or leave it out."
+                f"Piece {name!r} is floating: it stands neither on another piece nor on the table (z is up, the table "
+                f"is at z = {world.ground:g}). Move it down, or leave it out."
             )

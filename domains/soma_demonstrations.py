@@ -11,7 +11,6 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import os
-import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -23,6 +22,7 @@ from domains.soma_pieces import LETTERS, Cell, symmetries, turned
 from neurosym.demonstrations import Demonstrations
 from neurosym.errors import ContractError, UnknownNameError
 from neurosym.family import Progress
+from neurosym.files import replacing
 from neurosym.geometry.assembly import Assembly
 from neurosym.problem import Step
 from neurosym.registry import load_planner
@@ -147,9 +147,5 @@ def _count_labels(
 
 def _keep(path: Path, orders: NDArray[np.int64], shares: NDArray[np.float32]) -> None:
     """Write aside, then rename; a folder that cannot be written to costs speed, no more."""
-    with contextlib.suppress(OSError):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(dir=path.parent, suffix=".part")
-        with os.fdopen(handle, "wb") as file:
-            np.savez_compressed(file, orders=orders, shares=shares)
-        os.replace(name, path)
+    with contextlib.suppress(OSError), replacing(path) as temporary:
+        np.savez_compressed(temporary, orders=orders, shares=shares)

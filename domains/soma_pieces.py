@@ -41,7 +41,9 @@ def symmetries() -> NDArray[np.int64]:
     return np.array(sorted(found, key=lambda m: -round(np.linalg.det(m))))
 
 
-def turned(cells: dict[str, tuple[Cell, ...]], symmetry: NDArray[np.int64], side: int = 3) -> dict[str, tuple[Cell, ...]]:
+def turned(
+    cells: dict[str, tuple[Cell, ...]], symmetry: NDArray[np.int64], side: int = 3
+) -> dict[str, tuple[Cell, ...]]:
     """A cube's pieces under a symmetry of the cube; under a reflection A and B change names."""
     mirrored = np.linalg.det(symmetry) < 0
     found = {}
@@ -107,6 +109,6 @@ def solutions() -> tuple[dict[str, tuple[Cell, ...]], ...]:
     mirrored = swap[covers.reshape(-1, 3, 3, 3)[:, :, ::-1, :].reshape(-1, 27)]
     listed = sorted({min(tuple(a), tuple(b)) for a, b in zip(covers.tolist(), mirrored.tolist())})
     return tuple(
-        {name: tuple(map(tuple, grid[np.array(cube) == n].tolist())) for n, name in enumerate(LETTERS)}  # type: ignore[misc]
+        {name: tuple(map(tuple, grid[np.array(cube) == n].tolist())) for n, name in enumerate(LETTERS)}
         for cube in listed
     )

@@ -16,6 +16,7 @@ from neurosym import __version__
 from neurosym.commands.compare import compare
 from neurosym.commands.learn import demos, train
 from neurosym.commands.plan import plan
+from neurosym.commands.reproduce import reproduce
 from neurosym.commands.survey import doctor, names
 from neurosym.errors import NeurosymError
 from neurosym.exit_codes import BAD_INPUT, EXIT_CODES, INTERRUPTED
@@ -34,6 +35,7 @@ app.command("compare")(compare)
 app.command("plan")(plan)
 app.command("demos")(demos)
 app.command("train")(train)
+app.command("reproduce")(reproduce)
 app.command("list")(names)
 app.command("doctor")(doctor)
 

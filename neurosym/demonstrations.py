@@ -5,8 +5,6 @@ Stored as ``.npz`` without pickle. Shapes: M demonstrations, V views of H x W pi
 
 from __future__ import annotations
 
-import os
-import tempfile
 import zipfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from neurosym.errors import DemonstrationError
+from neurosym.files import replacing
 
 SCHEMA = 1
 
@@ -95,15 +94,8 @@ class Demonstrations:
         }
         if self.marginals is not None:
             arrays["marginals"] = self.marginals
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".tmp")
-        try:
-            with os.fdopen(handle, "wb") as file:
-                np.savez_compressed(file, **arrays)  # type: ignore[arg-type]
-            os.replace(temporary, path)
-        except BaseException:
-            Path(temporary).unlink(missing_ok=True)
-            raise
+        with replacing(path) as temporary:
+            np.savez_compressed(temporary, **arrays)  # type: ignore[arg-type]
         return path
 
     @classmethod

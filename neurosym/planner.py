@@ -206,7 +206,8 @@ class SearchLog(Generic[S]):
         cost: float | None,
         first_guess_failed: bool | None,
     ) -> PlanResult:
-        blame = tuple(Refusal(self.names(p), self.problem.actions[a], r.reason, r.because) for p, a, r in self._refusals)
+        names = self.problem.actions
+        blame = tuple(Refusal(self.names(p), names[a], r.reason, r.because) for p, a, r in self._refusals)
         return PlanResult(
             status=status,
             plan=None if plan is None else self.names(plan),

@@ -12,6 +12,7 @@ parts also return must pass ``removal=False``.
 from __future__ import annotations
 
 from collections.abc import Sequence
+
 from numpy.typing import ArrayLike
 
 from neurosym.errors import DefinitionError

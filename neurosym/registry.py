@@ -6,15 +6,18 @@ Wherever a name is taken, an object is too.
 from __future__ import annotations
 
 import inspect
+from collections.abc import Callable
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from neurosym.errors import ContractError, InputError, UnknownNameError
 from neurosym.family import ProblemFamily
 from neurosym.planner import Planner
 from neurosym.prior import Prior
+
+T = TypeVar("T")
 
 DOMAINS, PLANNERS, PRIORS = "neurosym.domains", "neurosym.planners", "neurosym.priors"
 _REINSTALL = "A new entry point shows only after the package that declares it is installed again."
@@ -70,7 +73,7 @@ def load_prior(prior: str | Path | Prior, **options: Any) -> Prior:
     return _make(PRIORS, "prior", str(prior), Prior, options, hint="A weights file ends in .safetensors.")
 
 
-def _make(group: str, kind: str, name: object, base: type, options: dict[str, Any], hint: str = "") -> Any:
+def _make(group: str, kind: str, name: object, base: Callable[..., T], options: dict[str, Any], hint: str = "") -> T:
     known = _entry_points(group)
     if not isinstance(name, str) or name not in known:
         raise UnknownNameError(kind, name, known, hint=f"{hint} {_REINSTALL}".strip())
@@ -79,8 +82,8 @@ def _make(group: str, kind: str, name: object, base: type, options: dict[str, An
         inspect.signature(factory).bind(**options)
     except TypeError as error:
         raise InputError(f"Expected options that the {kind} {name!r} takes; got {options}: {error}.") from None
-    made = factory(**options)
-    if not isinstance(made, base):
+    made: T = factory(**options)
+    if not isinstance(made, base):  # type: ignore[arg-type]
         raise ContractError(
             f"Expected the entry point {name!r} of {group} to give a {base.__name__}; got {type(made).__name__}."
         )

@@ -29,7 +29,7 @@ def read_header(path: Path) -> dict[str, Any]:
         if not isinstance(ours, dict):
             raise ValueError("its header is not an object")
     except FileNotFoundError:
-        raise CheckpointError(f"Expected a weights file at {path}; there is none. `neurosym train` makes one.") from None
+        raise CheckpointError(f"Expected a weights file at {path}; none is there: `neurosym train` makes it.") from None
     except OSError as error:
         raise CheckpointError(f"Expected to read the weights file {path}; got: {error}.") from None
     except (ValueError, KeyError, TypeError) as error:

@@ -115,7 +115,8 @@ def test_cubes_and_strict_equal_the_integer_rule_and_the_fresh_replay(number, or
 def meshes_of(cells):
     found = {}
     for name, own in cells.items():
-        boxes = [trimesh.creation.box((1, 1, 1), trimesh.transformations.translation_matrix(np.array(c) + 0.5)) for c in own]
+        places = [trimesh.transformations.translation_matrix(np.array(c) + 0.5) for c in own]
+        boxes = [trimesh.creation.box((1, 1, 1), place) for place in places]
         found[name] = trimesh.util.concatenate(boxes)
     return found
 
@@ -293,7 +294,8 @@ def test_labels_hold_in_every_pose(monkeypatch, tmp_path):
     for pose in range(0, 48, 5):
         problem = soma.problem_from_cells(turned(cells, symmetries()[pose]), collapse="strict")
         assert ns.validate(problem, [LETTERS[a] for a in orders_[pose]]).ok
-        np.testing.assert_allclose(ns.load_planner("exhaustive").order_marginals(problem.ground()), shares[pose], atol=1e-6)
+        counted = ns.load_planner("exhaustive").order_marginals(problem.ground())
+        np.testing.assert_allclose(counted, shares[pose], atol=1e-6)
     again = _labels(soma, cells)
     assert (again[0] == orders_).all()
     assert (again[1] == shares).all()

@@ -111,7 +111,8 @@ def hull_points(points: Array, normal: Array) -> Array:
     u, v = plane_axes(normal)
     flat = np.stack([points @ u, points @ v], axis=1)
     try:
-        return points[ConvexHull(flat).vertices]
+        corners: Array = points[ConvexHull(flat).vertices]
+        return corners
     except QhullError:
         return points[:0]
 
@@ -160,7 +161,9 @@ def _facet_contacts(assembly: Assembly, a: int, b: int) -> list[Contact]:
     return found
 
 
-def _by_plane(normals: Array, triangles: Array, pairs: NDArray[np.int64], assembly: Assembly) -> list[NDArray[np.int64]]:
+def _by_plane(
+    normals: Array, triangles: Array, pairs: NDArray[np.int64], assembly: Assembly
+) -> list[NDArray[np.int64]]:
     """Pairs of facets grouped by the plane of their first facet."""
     groups: list[tuple[Array, float, list[NDArray[np.int64]]]] = []
     for pair in pairs:

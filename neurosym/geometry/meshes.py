@@ -44,7 +44,9 @@ def _triangles(name: str, mesh: Any) -> Triangles:
             f"Part {name!r}: expected vertices (n, 3) and faces (m, 3), not empty; got {v.shape} and {f.shape}."
         )
     if f.min() < 0 or f.max() >= len(v):
-        raise AssemblyError(f"Part {name!r}: expected faces that index its {len(v)} vertices; got {f.min()} to {f.max()}.")
+        raise AssemblyError(
+            f"Part {name!r}: expected faces that index its {len(v)} vertices; got {f.min()} to {f.max()}."
+        )
     if not np.isfinite(v).all():
         raise AssemblyError(f"Part {name!r}: expected finite coordinates; got NaN or infinity.")
     volume = signed_volume(v, f)
@@ -189,5 +191,4 @@ def _in_triangles(points: Array, triangles: Array) -> NDArray[np.bool_]:
         e = b - a
         sides.append(e[None, :, 0] * d[..., 1] - e[None, :, 1] * d[..., 0])
     stacked = np.stack(sides)
-    found: NDArray[np.bool_] = (stacked > 0).all(axis=0) | (stacked < 0).all(axis=0)
-    return found
+    return np.asarray((stacked > 0).all(axis=0) | (stacked < 0).all(axis=0))

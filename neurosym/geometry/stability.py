@@ -27,7 +27,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-#: Edges of the pyramid that stands for a friction cone. It lies inside the cone: at worst it allows cos(45 deg) of the friction.
+#: Edges of the pyramid that stands for a friction cone. It lies inside the cone: along its faces it allows
+#: cos(45 deg) of the friction.
 CONE_EDGES = 4
 
 #: Unbalanced force, as a share of the mean part's weight, below which a subset counts as standing.

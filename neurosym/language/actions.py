@@ -60,7 +60,7 @@ class Action:
             raise DefinitionError(f"In action {name!r}: expected a label over {names}; got {self.label!r}.")
 
     def _literals(self, where: str, conditions: Sequence[Condition]) -> tuple[Literal, ...]:
-        if isinstance(conditions, str) or not isinstance(conditions, Sequence):
+        if not isinstance(conditions, list | tuple):
             raise DefinitionError(f"In action {self.name!r}: expected {where} to be a list; got {conditions!r}.")
         known = set(self.params)
         literals = []

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
+from typing import Literal as OneOf
 
 import networkx as nx
 import numpy as np
@@ -34,7 +35,7 @@ class Simulation:
         absent: parts of the world that are gone when the problem begins.
     """
 
-    bodies: str
+    bodies: OneOf["cubes", "rigid"]
     removes: Mapping[str, str]
     absent: tuple[str, ...] = ()
 

@@ -137,7 +137,8 @@ class GroundProblem:
         problem = self.problem
         changed = {e.atom.predicate for a in problem.domain.actions for e in a.eff}
         initial = set(problem.init)
-        instances, seen = [], {}
+        instances: list[_Instance] = []
+        seen: dict[str, str] = {}
         for action in problem.domain.actions:
             for binding in problem.bindings(action):
                 name = action.ground_name(binding)

@@ -74,7 +74,8 @@ def check_problem(problem: Problem, *, walks: int = 4, rng: np.random.Generator 
 
 def _walk(problem: Problem, search: SearchProblem[Any], rng: np.random.Generator, label: str) -> None:
     """A random walk: every refusal on it must keep its promise for the rest of it."""
-    state, done = search.initial, []
+    state = search.initial
+    done: list[int] = []
     standing: dict[int, tuple[set[int], Rejection]] = {}
     for _ in range(len(search.actions) + 1):
         candidates = list(search.candidates(state))

@@ -1,0 +1,284 @@
+"""Rebuild an experiment of the paper: train on each split, test on its other half, and say what came beside the paper.
+
+Every finished training and comparison is kept, so a run that was killed goes on where it was.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import os
+import platform
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from neurosym import __version__, benchmark
+from neurosym.benchmark import Comparison, Outcome, Run
+from neurosym.errors import InputError
+from neurosym.family import ProblemFamily
+from neurosym.files import replacing
+from neurosym.registry import load_domain, load_prior
+
+#: Called with one line about what is going on.
+Say = Callable[[str], None]
+
+#: Priors whose names end so learn from one demonstration a problem, as in the paper.
+PAPER = "-paper"
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """What is rebuilt.
+
+    Attributes:
+        domain: the problem family.
+        splits: random splits into train and test, 0 .. splits - 1; each is trained and tested once.
+        styles: styles of pictures; trained and tested on the same style.
+        methods: priors that are trained.
+        planners: planners that use them.
+        repeats: how often each test problem is planned.
+        seed: of pictures and training.
+        epochs: None takes each recipe's.
+    """
+
+    domain: str
+    splits: int = 5
+    styles: tuple[str, ...] = ("clean", "varied")
+    methods: tuple[str, ...] = ("sinkhorn", "tcn", "sinkhorn-paper", "tcn-paper")
+    planners: tuple[str, ...] = ("swap-repair", "backtracking", "best-first")
+    repeats: int = 5
+    seed: int = 0
+    epochs: int | None = None
+
+    def __post_init__(self) -> None:
+        if self.splits < 1 or not (self.styles and self.methods and self.planners):
+            raise InputError("Expected at least one split, style, method and planner; got none of one.")
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One training: a method on a style of pictures and a split."""
+
+    style: str
+    method: str
+    split: int
+
+    def path(self, out: Path) -> Path:
+        return out / "weights" / f"{self.style}-{self.method}-split{self.split}.safetensors"
+
+
+@dataclass(frozen=True)
+class Record:
+    """One number: a line of results.csv."""
+
+    experiment: str
+    pictures: str
+    method: str
+    n: int
+    seed: int
+    metric: str
+    value: float
+
+
+def reproduce(experiment: Experiment, out: Path, *, workers: int = 1, say: Say = lambda _: None) -> list[Record]:
+    """Train what is not trained yet, compare, and write results.csv, report.md and iterations.png into `out`.
+
+    Args:
+        workers: processes; each trains with one thread.
+        say: told what is going on.
+    """
+    family = load_domain(experiment.domain)
+    _same_experiment(experiment, out)
+    cells = [
+        Cell(style, method, split)
+        for split in range(experiment.splits)
+        for style in experiment.styles
+        for method in experiment.methods
+    ]
+    for style in experiment.styles:
+        _make_demonstrations(family, experiment, style, [c for c in cells if c.style == style], out, say)
+    missing = [c for c in cells if not c.path(out).exists()]
+    say(f"{len(cells) - len(missing)} of {len(cells)} networks are trained already.")
+    for k, line in enumerate(_train_all(experiment, missing, out, workers)):
+        say(f"[{k + 1}/{len(missing)}] {line}")
+
+    records: list[Record] = []
+    outcomes: dict[tuple[str, int], Outcome] = {}
+    for style in experiment.styles:
+        for split in range(experiment.splits):
+            outcome = _compare(experiment, style, split, out, workers)
+            outcomes[style, split] = outcome
+            records += _records(experiment, outcome, style, split, out)
+            say(f"{style} pictures, split {split}: compared.")
+    _write(experiment, records, outcomes, out)
+    return records
+
+
+def train_cell(experiment: Experiment, cell: Cell, out: Path) -> str:
+    """Train one network and keep its weights; a checkpoint lets a killed training go on."""
+    family = load_domain(experiment.domain)
+    recipe = "paper" if cell.method.endswith(PAPER) else "full"
+    given = family.demonstrations(
+        "train", split=cell.split, recipe=recipe, style=cell.style, seed=experiment.seed
+    )
+    learner: Any = load_prior(cell.method)
+    path = cell.path(out)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    checkpoint = path.with_suffix(".checkpoint")
+    learner.fit(given, seed=experiment.seed, epochs=experiment.epochs, checkpoint=checkpoint)
+    learner.save(path)
+    checkpoint.unlink(missing_ok=True)
+    return f"{cell.method}, {cell.style} pictures, split {cell.split}: {learner.header['training']['seconds']:.0f} s"
+
+
+def _train_all(experiment: Experiment, missing: Sequence[Cell], out: Path, workers: int) -> Iterable[str]:
+    if workers <= 1 or len(missing) <= 1:
+        return (train_cell(experiment, cell, out) for cell in missing)
+    from joblib import Parallel, delayed
+
+    lines: Iterable[str] = Parallel(n_jobs=workers, return_as="generator_unordered")(
+        delayed(train_cell)(experiment, cell, out) for cell in missing
+    )
+    return lines
+
+
+def _make_demonstrations(
+    family: ProblemFamily, experiment: Experiment, style: str, cells: Sequence[Cell], out: Path, say: Say
+) -> None:
+    """Pictures and labels are kept on disk by the family; making them first keeps them out of the training times."""
+    wanted = {(c.split, c.method.endswith(PAPER)) for c in cells if not c.path(out).exists()}
+    for split, paper in sorted(wanted):
+        say(f"demonstrations: {style} pictures, split {split}, recipe {'paper' if paper else 'full'}")
+        family.demonstrations(
+            "train", split=split, recipe="paper" if paper else "full", style=style, seed=experiment.seed
+        )
+
+
+def _compare(experiment: Experiment, style: str, split: int, out: Path, workers: int) -> Outcome:
+    family = load_domain(experiment.domain)
+    numbers = tuple(family.numbers("test", split=split))
+    method_of = {str(Cell(style, m, split).path(out)): m for m in experiment.methods}
+    comparison = Comparison(
+        domain=experiment.domain,
+        numbers=numbers,
+        planners=experiment.planners,
+        priors=("random", *method_of),
+        options={"pictures": style, "seed": experiment.seed},
+        seeds=experiment.repeats,
+    )
+    runs = benchmark.run(comparison, workers=workers, journal=out / f"runs-{style}-{split}.jsonl")
+    blind = benchmark.image_blind(comparison, split=split)
+    # Weights files stand under the names of their methods from here on.
+    named = tuple(replace(r, prior=method_of.get(r.prior, r.prior)) for r in runs)
+    return Outcome(replace(comparison, priors=("random", *experiment.methods)), named, *(blind or (None, ())))
+
+
+def _records(experiment: Experiment, outcome: Outcome, style: str, split: int, out: Path) -> list[Record]:
+    found = []
+    n = len(outcome.comparison.numbers)
+
+    def add(method: str, metric: str, value: Any) -> None:
+        found.append(Record(experiment.domain, style, method, n, split, metric, float(value)))
+
+    for method in outcome.comparison.priors:
+        runs = [r for r in outcome.runs if r.prior == method]
+        add(method, "initial_failures", np.mean([r.first_order_failed for r in runs]))
+        for planner in experiment.planners:
+            own = [r.iterations for r in runs if r.planner == planner]
+            add(method, f"iterations {planner}", np.mean(own))
+            add(method, f"iterations_std {planner}", np.std(own))
+        if method in experiment.methods:
+            header = load_prior(Cell(style, method, split).path(out)).header  # type: ignore[attr-defined]
+            add(method, "training_seconds", header["training"]["seconds"])
+    if outcome.image_blind is not None:
+        add("best fixed order", "initial_failures", outcome.image_blind)
+    return found
+
+
+def _write(
+    experiment: Experiment, records: Sequence[Record], outcomes: dict[tuple[str, int], Outcome], out: Path
+) -> None:
+    text = io.StringIO()
+    writer = csv.DictWriter(text, list(asdict(records[0])), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(asdict(r) for r in records)
+    _write_text(out / "results.csv", text.getvalue())
+    _write_text(out / "report.md", report(experiment, records))
+    from neurosym.plotting import iterations_figure, save
+
+    for style in experiment.styles:
+        own = [outcomes[style, split] for split in range(experiment.splits)]
+        runs: tuple[Run, ...] = tuple(r for o in own for r in o.runs)
+        numbers = tuple(n for o in own for n in o.comparison.numbers)
+        pooled = Outcome(replace(own[0].comparison, numbers=numbers), runs)
+        save(iterations_figure(pooled), out / f"iterations-{style}.png")
+
+
+def report(experiment: Experiment, records: Sequence[Record]) -> str:
+    """A page of Markdown: ours beside the paper's, means over splits with the deviation between splits."""
+    published = {(r["prior"], r["planner"]): r for r in load_domain(experiment.domain).published}
+    lines = [
+        f"# {experiment.domain}: {experiment.splits} random splits",
+        "",
+        "Trained on one half, tested on the other. Mean over splits ± deviation between splits; iterations are "
+        "refusals before the plan. The paper's deviation is over problems and splits.",
+    ]
+    for style in experiment.styles:
+        columns = ["initial failures %", *(f"iterations, {p}" for p in experiment.planners), "training s"]
+        head = ["method", *columns, "paper: failures %", "paper: iterations"]
+        lines += ["", f"## {style} pictures", "", f"| {' | '.join(head)} |", "|" + "---|" * len(head)]
+        for method in ("best fixed order", "random", *experiment.methods):
+            paper = published.get((method, "swap-repair"), {})
+            row = [
+                _mean(records, style, method, "initial_failures", 100, 1),
+                *(_mean(records, style, method, f"iterations {p}", 1, 3) for p in experiment.planners),
+                _mean(records, style, method, "training_seconds", 1, 0),
+                _pair(paper.get("initial_failures")),
+                _pair(paper.get("iterations")),
+            ]
+            lines.append(f"| {method} | " + " | ".join(row) + " |")
+    lines += [
+        "",
+        f"neurosym {__version__}, Python {platform.python_version()}, {os.cpu_count()} processors; seed "
+        f"{experiment.seed}, each test problem planned {experiment.repeats} times. The best fixed order is the one "
+        "that fails least on the training half: it looks at no picture.",
+        "",
+    ]
+    return "\n".join(lines)
+
+
+def _mean(records: Sequence[Record], style: str, method: str, metric: str, scale: float, digits: int) -> str:
+    values = [scale * r.value for r in records if (r.pictures, r.method, r.metric) == (style, method, metric)]
+    if not values:
+        return ""
+    return f"{np.mean(values):.{digits}f}" + (f" ± {np.std(values):.{digits}f}" if len(values) > 1 else "")
+
+
+def _pair(value: tuple[float, float] | None) -> str:
+    return "" if value is None else f"{value[0]} ± {value[1]}"
+
+
+def _same_experiment(experiment: Experiment, out: Path) -> None:
+    """A folder belongs to one experiment: what another left there would be taken for finished."""
+    fixed = {"domain": experiment.domain, "seed": experiment.seed, "epochs": experiment.epochs, "version": __version__}
+    path = out / "experiment.json"
+    if path.exists():
+        try:
+            known = json.loads(path.read_text())
+        except ValueError:
+            known = None
+        if known != fixed:
+            raise InputError(
+                f"Expected {out} to be empty or to hold this experiment, {fixed}; it holds {known}. Name another."
+            )
+    _write_text(path, json.dumps(fixed) + "\n")
+
+
+def _write_text(path: Path, content: str) -> None:
+    with replacing(path) as temporary:
+        temporary.write_text(content, encoding="utf-8")
