@@ -14,8 +14,8 @@ left decides where every cube lies.
 
 from __future__ import annotations
 
-from collections import Counter
 from dataclasses import dataclass, field
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,6 +80,7 @@ class Stacks:
 def keeps_standing(present: Fluent, rule: str) -> Derived:
     """``keeps_standing(p)``: at most `MAY_MOVE` cubes move when piece p is deleted."""
     limit = MAY_MOVE[rule]
+    atom_of = cache(present)  # atoms are checked when they are made: once a piece will do
 
     def keeps_standing(world: Assembly, state: State, p: str) -> Verdict:
         number = world.index[p]
@@ -92,19 +93,21 @@ def keeps_standing(present: Fluent, rule: str) -> Derived:
         return _STANDS if moving.bit_count() <= limit else collapse(world, number, moving)
 
     def collapse(world: Assembly, number: int, moving: int) -> Verdict:
-        owners = [int(world.owners[cube]) for cube in bits(moving)]
-        names = tuple(world.names[i] for i in sorted(set(owners)))
+        """The refusal for cubes that would move. On the way of every refused attempt, so kept short."""
+        counts = [(-(own & moving).bit_count(), i) for i, own in enumerate(Stacks.of(world).own) if own & moving]
+        names = world.names
+        because = tuple([names[i] for _, i in counts])
         # As long as any limit + 1 of these cubes are there, they move; the fewest pieces that own so many.
-        counts = sorted(Counter(owners).items(), key=lambda item: -item[1])
+        counts.sort()
         until, cubes = [], 0
-        for owner, count in counts:
-            until.append(present(world.names[owner]))
-            cubes += count
+        for count, owner in counts:
+            until.append(atom_of(names[owner]))
+            cubes -= count
             if cubes > limit:
                 break
-        falling = f"{len(owners)} cube{'s' * (len(owners) > 1)} of {', '.join(names)}"
-        said = f"Without {world.names[number]}, {falling} would {_WORD[rule]}."
-        return Verdict(False, names, said, tuple(until))
+        total = moving.bit_count()
+        falling = f"{total} cube{'s' if total > 1 else ''} of {', '.join(because)}"
+        return Verdict(False, because, f"Without {names[number]}, {falling} would {_WORD[rule]}.", tuple(until))
 
     return Derived("keeps_standing", present.types, keeps_standing)
 

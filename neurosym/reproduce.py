@@ -44,6 +44,7 @@ class Experiment:
         repeats: how often each test problem is planned.
         seed: of pictures and training.
         epochs: None takes each recipe's.
+        tests: how many problems of each test half are planned; None plans all.
     """
 
     domain: str
@@ -54,6 +55,7 @@ class Experiment:
     repeats: int = 5
     seed: int = 0
     epochs: int | None = None
+    tests: int | None = None
 
     def __post_init__(self) -> None:
         if self.splits < 1 or not (self.styles and self.methods and self.planners):
@@ -161,21 +163,21 @@ def _make_demonstrations(
 
 def _compare(experiment: Experiment, style: str, split: int, out: Path, workers: int) -> Outcome:
     family = load_domain(experiment.domain)
-    numbers = tuple(family.numbers("test", split=split))
-    method_of = {str(Cell(style, m, split).path(out)): m for m in experiment.methods}
+    numbers = tuple(family.numbers("test", split=split))[: experiment.tests]
     comparison = Comparison(
         domain=experiment.domain,
         numbers=numbers,
         planners=experiment.planners,
-        priors=("random", *method_of),
+        priors=("random", *experiment.methods),
         options={"pictures": style, "seed": experiment.seed},
         seeds=experiment.repeats,
     )
-    runs = benchmark.run(comparison, workers=workers, journal=out / f"runs-{style}-{split}.jsonl")
+    problems = family.observed([family.problem(n, **comparison.options) for n in numbers], workers=workers)
+    scores = {m: load_prior(Cell(style, m, split).path(out)).scores(problems) for m in experiment.methods}
+    scores["random"] = load_prior("random").scores(problems)
+    runs = benchmark.run(comparison, scores, workers=workers, journal=out / f"runs-{style}-{split}.jsonl")
     blind = benchmark.image_blind(comparison, split=split)
-    # Weights files stand under the names of their methods from here on.
-    named = tuple(replace(r, prior=method_of.get(r.prior, r.prior)) for r in runs)
-    return Outcome(replace(comparison, priors=("random", *experiment.methods)), named, *(blind or (None, ())))
+    return Outcome(comparison, runs, *(blind or (None, ())))
 
 
 def _records(experiment: Experiment, outcome: Outcome, style: str, split: int, out: Path) -> list[Record]:

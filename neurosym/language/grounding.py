@@ -65,6 +65,7 @@ class GroundProblem:
         self._done_bits = done
         self.classes: tuple[int, ...] = self._classes(all_names, {a for pair in precedence for a in pair})
         self._touching: dict[Atom, tuple[int, ...]] = {}
+        self._promises: dict[tuple[Atom, ...], tuple[int, ...]] = {}
         for i, instance in enumerate(reachable):
             for effect in instance.eff:
                 self._touching[effect.atom] = (*self._touching.get(effect.atom, ()), i)
@@ -128,8 +129,11 @@ class GroundProblem:
         # A promise speaks of a verdict that stays false; it says nothing of one that must become false.
         if not positive or verdict.until is None:
             return Rejection(said, verdict.because, ())
-        until = {a for atom in verdict.until for a in self._touching.get(atom, ())}
-        return Rejection(said, verdict.because, tuple(sorted(until)) or (action,))
+        until = self._promises.get(verdict.until)
+        if until is None:
+            touching = {a for atom in verdict.until for a in self._touching.get(atom, ())}
+            until = self._promises[verdict.until] = tuple(sorted(touching))
+        return Rejection(said, verdict.because, until or (action,))
 
     # -- construction -----------------------------------------------------------------------------------------
 
