@@ -1,0 +1,99 @@
+"""Examples run, say what they claim, and stay short."""
+
+import importlib.util
+from pathlib import Path
+
+import pytest
+
+import neurosym as ns
+
+FOLDER = Path(__file__).parent.parent / "examples"
+
+
+def load(name):
+    spec = importlib.util.spec_from_file_location(f"example_{name}", FOLDER / f"{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.parametrize("path", sorted(FOLDER.glob("*.py")), ids=lambda path: path.stem)
+def test_each_is_short_and_says_what_it_shows(path):
+    text = path.read_text()
+    assert len(text.splitlines()) < 80
+    assert "shows" in text.split('"""')[1]
+    assert f"python examples/{path.name}" in text
+
+
+def test_the_new_domain_is_defined_in_25_lines():
+    text = (FOLDER / "new_domain.py").read_text()
+    definition = text.split("# -- the definition")[1].split("# -- what it shows")[0].splitlines()[1:]
+    assert len([line for line in definition if line.strip()]) <= 25
+
+
+@pytest.fixture(scope="module")
+def balance():
+    return load("new_domain")
+
+
+def test_the_balance_has_plans_and_dead_ends(balance):
+    problem = balance.balance()
+    assert ns.count_plans(problem) == 28
+    inner_gone = ("near-left", "near-right", "middle")
+    assert all(ns.validate(problem, inner_gone[: i + 1]).failed_at == i + 1 for i in range(3)), "the prefix can be done"
+    assert not any(ns.validate(problem, [*inner_gone, last]).failed_at == 4 for last in ("far-left", "far-right"))
+    assert ns.solve(balance.balance(("far-left", "far-right"))).status is ns.Status.UNSOLVABLE
+
+
+def test_backtracking_really_goes_back_on_the_balance(balance):
+    problem = balance.balance()
+    deepest = 0
+    for planner in ("backtracking", "best-first", "exhaustive"):
+        for seed in range(20):
+            result = ns.solve(problem, planner=planner, rng=seed)
+            assert result.solved, (planner, seed)
+            if planner == "backtracking":
+                # Every state on a plan is expanded once; more than that were entered and left again.
+                deepest = max(deepest, result.expansions - len(result.plan))
+    assert deepest > 0
+
+
+@pytest.mark.parametrize("planner", ["backtracking", "best-first"])
+def test_a_prior_that_lures_into_the_dead_end_does_no_lasting_harm(balance, planner):
+    problem = balance.balance()
+    bait = [problem.actions.index(a) for a in ("near-left", "near-right", "middle", "far-left", "far-right")]
+    lured = ns.OrderScores.from_order(bait, problem.actions)
+    assert ns.solve(problem, planner=planner, prior=lured).solved
+    stuck = ns.solve(balance.balance(("far-left", "far-right")), planner=planner)
+    assert stuck.status is ns.Status.UNSOLVABLE
+
+
+def test_new_domain_shows_who_gets_stuck(balance, capsys):
+    solved = balance.main(seeds=10)
+    assert solved["swap-repair"] < 10
+    assert solved["backtracking"] == solved["best-first"] == 10
+    assert "Proved: no order" in capsys.readouterr().out
+
+
+def test_plan_one_cube(capsys):
+    result, wish = load("plan_one_cube").main()
+    assert result.solved
+    assert wish.status is ns.Status.UNSOLVABLE
+    said = capsys.readouterr().out
+    assert " ".join(result.plan) in said
+    assert "the same backwards: Step 0" in said
+
+
+def test_compare_iterations(tmp_path, capsys):
+    means = load("compare_iterations").main(problems=6, out=str(tmp_path / "iterations.png"))
+    assert means["swap-repair", "tallest-first"] < means["swap-repair", "none"]
+    assert (tmp_path / "iterations.png").stat().st_size > 5000
+    assert "saves iterations" in capsys.readouterr().out
+
+
+def test_train_prior(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("NEUROSYM_CACHE", str(tmp_path / "cache"))
+    failures = load("train_prior").main(epochs=3, tested=4, out=str(tmp_path / "prior.safetensors"))
+    assert failures.keys() == {"random", "trained"}
+    assert (tmp_path / "prior.safetensors").exists()
+    assert "from the pictures of soma-" in capsys.readouterr().out
