@@ -71,7 +71,9 @@ class Recipe:
     train: TrainConfig
 
 
-# The paper trains for thousands of epochs; on Soma the held-out error stops falling long before, and then rises.
+# The full recipes hold nothing out: on 120 Soma cubes, a tenth kept back to choose the best epoch raised the failures
+# on unseen cubes, in all 48 poses, from 0.9% to 1.2%.
+# The paper trains for thousands of epochs; on pictures of Soma, 300 were no better than 150.
 _PAPER = {"optimizer": "adam", "rate": 3e-4, "schedule": "constant", "batch": 32, "weight_decay": 0.0}
 
 RECIPES = {
