@@ -9,7 +9,7 @@ STAMP := $(VENV)/.neurosym-installed
 SRC := neurosym domains planners learned_priors tests examples $(wildcard benchmarks)
 OUT ?= out/compare-soma
 
-.PHONY: help setup demo test check bench clean constraints
+.PHONY: help setup demo readme test check bench clean constraints
 
 help:
 	@echo "make demo    compare planners and priors on the 120 test cubes (table, results.csv, iterations.png)"
@@ -34,6 +34,10 @@ $(STAMP): pyproject.toml constraints.txt
 
 demo: $(STAMP)
 	$(BIN)/neurosym compare soma --problems test --out $(OUT)
+
+# The README's table, from the last `make demo`: between the two marks everything is replaced.
+readme: demo
+	sed -i -e '/<!-- table:begin/,/<!-- table:end/{//!d}' -e '/<!-- table:begin/r $(OUT)/results.md' README.md
 
 # Two processes, one thread each: numerical libraries that start threads of their own on a shared machine crawl.
 test: $(STAMP)

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import csv
+import os
+import platform
 from collections.abc import Mapping, Sequence
+from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -107,6 +110,25 @@ def markdown(given: Sequence[Row]) -> str:
     head = ("planner", "prior", "solved", "initial failures %", "iterations", "expansions", "attempts", "ms a problem")
     lines = [(*head, "paper: failures %", "paper: iterations"), ("---",) * 10, *map(cells, given)]
     return "\n".join(f"| {' | '.join(line)} |" for line in lines) + "\n"
+
+
+def report(outcome: Outcome) -> str:
+    """The comparison as Markdown, with what a reader needs to repeat it: options, seeds, versions, machine."""
+    comparison = outcome.comparison
+    options = ", ".join(f"{key} {value}" for key, value in comparison.options.items())
+    said = f"{len(comparison.numbers)} problems x {comparison.seeds} seed(s) from 0; {options}; {comparison.oracle}."
+    if outcome.image_blind is not None:
+        order = " ".join(outcome.image_blind_order)
+        said += f" The best fixed order ({order}), which looks at no picture, fails on {100 * outcome.image_blind:.1f}%."
+    return f"{markdown(rows(outcome))}\n{said} {provenance()}\n"
+
+
+def provenance() -> str:
+    """Versions and machine, one sentence."""
+    names = ("neurosym-assembly", "numpy", "scipy", "python-fcl", "pybullet", "torch")
+    versions = ", ".join(f"{name} {metadata.version(name)}" for name in names)
+    machine = f"Python {platform.python_version()} on {platform.system()} {platform.machine()}, {os.cpu_count()} cores"
+    return f"{versions}; {machine}."
 
 
 def write_csv(given: Sequence[Row], path: str | Path) -> Path:

@@ -53,7 +53,7 @@ def compare(
     oracle: OracleName = Oracle.geometry,
     seeds: Annotated[int, typer.Option("--seeds", min=1, metavar="K", help="Solve each problem K times.")] = 1,
     out: Annotated[
-        Path | None, typer.Option("--out", metavar="DIR", help="Folder for results.csv, iterations.png and runs.jsonl.")
+        Path | None, typer.Option("--out", metavar="DIR", help="Folder for the table, the figure and the journal.")
     ] = None,
     as_json: AsJson = False,
     workers: Annotated[
@@ -62,7 +62,7 @@ def compare(
 ) -> None:
     """Compare planners and priors on a domain's problems: one row a planner and prior.
 
-    Finished runs are kept in DIR/runs.jsonl: interrupted, or asked again with one more prior, it does only the rest.
+    Writes results.csv, results.md and iterations.png. Finished runs are kept in DIR/runs.jsonl: interrupted, or asked again with one more prior, it does only the rest.
     Without --out, files go to out/compare-DOMAIN (with --json nowhere).
     """
     from neurosym.benchmark import Comparison, Outcome, image_blind, run
@@ -130,9 +130,11 @@ def _scores(comparison: Comparison, *, asked: bool, workers: int) -> tuple[Compa
 
 def _write(outcome: Outcome, table: list[Row], folder: Path) -> None:
     from neurosym.plotting import iterations_figure, save
-    from neurosym.reporting import write_csv
+    from neurosym.files import write_text
+    from neurosym.reporting import report, write_csv
 
     write_csv(table, folder / "results.csv")
+    write_text(folder / "results.md", report(outcome))
     save(iterations_figure(outcome), folder / "iterations.png")
 
 
