@@ -56,7 +56,7 @@ def iterations_figure(outcome: Outcome) -> Figure:
     counts = f"{len(comparison.numbers)} problems" + (f" × {comparison.seeds} seeds" if comparison.seeds > 1 else "")
     rule = str(comparison.options.get("collapse") or "")
     said = ", ".join(filter(None, [comparison.domain, rule, comparison.oracle]))
-    figure.suptitle(f"{said}: n = {counts}", fontsize=8)
+    figure.suptitle(f"{said}: n = {counts}\nbars: share of runs (a full row is 100%)", fontsize=8)
     _legend(figure, marked)
     return figure
 
@@ -91,12 +91,8 @@ def _dress(axis: Axes, planner: str, priors: Sequence[str], last: int) -> None:
 
 def _legend(figure: Figure, with_paper: bool) -> None:
     from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch
 
-    handles: list[Line2D | Patch] = [
-        Patch(color="0.6", label="share of runs (row height: all)"),
-        Line2D([], [], ls="", marker="o", ms=4, mfc="black", mec="white", label="mean"),
-    ]
+    handles = [Line2D([], [], ls="", marker="o", ms=4, mfc="black", mec="white", label="mean")]
     if with_paper:
         handles.append(Line2D([], [], ls="", marker="D", ms=4, mfc="white", mec="black", label="mean in the paper"))
     figure.legend(handles=handles, loc="outside lower center", ncols=3, fontsize=7, frameon=False, handletextpad=0.4)

@@ -119,7 +119,8 @@ def report(outcome: Outcome) -> str:
     said = f"{len(comparison.numbers)} problems x {comparison.seeds} seed(s) from 0; {options}; {comparison.oracle}."
     if outcome.image_blind is not None:
         order = " ".join(outcome.image_blind_order)
-        said += f" The best fixed order ({order}), which looks at no picture, fails on {100 * outcome.image_blind:.1f}%."
+        failures = 100 * outcome.image_blind
+        said += f" The best fixed order ({order}), which looks at no picture, fails on {failures:.1f}%."
     return f"{markdown(rows(outcome))}\n{said} {provenance()}\n"
 
 

@@ -18,11 +18,7 @@ from neurosym.family import ProblemFamily, Progress
 from neurosym.files import write_text
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
-#: Narrower than this, rich would cut columns off a comparison; a terminal may wrap the lines instead.
-TABLE_WIDTH = 118
-
+    from rich.console import Console, RenderableType
 
 class Oracle(StrEnum):
     """What answers attempts."""
@@ -57,12 +53,13 @@ def say(text: str) -> None:
     print(text, file=sys.stderr, flush=True)
 
 
-def console() -> Console:
-    """Stdout, wide enough for a table of ours."""
+def console(content: RenderableType = "") -> Console:
+    """Stdout, as wide as the terminal, or as `content`: rich would cut columns off, a terminal wraps the lines."""
     from rich.console import Console
 
     out = Console(highlight=False)
-    return out if out.width >= TABLE_WIDTH else Console(highlight=False, width=TABLE_WIDTH)
+    needed = out.measure(content, options=out.options.update(width=1000)).maximum
+    return out if out.width >= needed else Console(highlight=False, width=needed)
 
 
 def cores() -> int:

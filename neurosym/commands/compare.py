@@ -62,7 +62,8 @@ def compare(
 ) -> None:
     """Compare planners and priors on a domain's problems: one row a planner and prior.
 
-    Writes results.csv, results.md and iterations.png. Finished runs are kept in DIR/runs.jsonl: interrupted, or asked again with one more prior, it does only the rest.
+    Writes results.csv, results.md and iterations.png. Finished runs are kept in DIR/runs.jsonl: interrupted, or asked
+    again with one more prior, it does only the rest.
     Without --out, files go to out/compare-DOMAIN (with --json nowhere).
     """
     from neurosym.benchmark import Comparison, Outcome, image_blind, run
@@ -129,8 +130,8 @@ def _scores(comparison: Comparison, *, asked: bool, workers: int) -> tuple[Compa
 
 
 def _write(outcome: Outcome, table: list[Row], folder: Path) -> None:
-    from neurosym.plotting import iterations_figure, save
     from neurosym.files import write_text
+    from neurosym.plotting import iterations_figure, save
     from neurosym.reporting import report, write_csv
 
     write_csv(table, folder / "results.csv")
@@ -142,11 +143,12 @@ def _show(outcome: Outcome, given: list[Row], family: ProblemFamily, folder: Pat
     from neurosym.reporting import table
 
     comparison = outcome.comparison
-    out = console()
+    shown = table(given)
+    out = console(shown)
     options = ", ".join(f"{key} {value}" for key, value in comparison.options.items())
     seeds = f", {comparison.seeds} seeds each" if comparison.seeds > 1 else ""
     out.print(f"{comparison.domain}: {len(comparison.numbers)} problems{seeds}; {options}, oracle {comparison.oracle}")
-    out.print(table(given))
+    out.print(shown)
     if outcome.image_blind is not None:
         out.print(
             f"Without looking at any picture: the best fixed order ({' '.join(outcome.image_blind_order)}) "
