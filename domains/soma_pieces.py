@@ -5,6 +5,7 @@ Pieces by Piet Hein; letters and the count of 240 as in Berlekamp, Conway, Guy, 
 
 from __future__ import annotations
 
+import warnings
 from functools import cache
 
 import numpy as np
@@ -81,7 +82,11 @@ def _covers() -> NDArray[np.int8]:
             owner.append(number)
     matrix = np.array(rows)
     found = []
-    for cover in covers_bool(matrix):
+    with warnings.catch_warnings():
+        # Of numba, when it first compiles xcover, about a hash in there; it is not the user's business.
+        warnings.filterwarnings("ignore", message="unsafe cast from uint64")
+        covers = list(covers_bool(matrix))
+    for cover in covers:
         filled = np.zeros(27, dtype=np.int8)
         for row_number in cover:
             filled[matrix[row_number, :27]] = owner[row_number]

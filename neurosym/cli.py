@@ -5,7 +5,6 @@ Exit codes are in `neurosym.exit_codes`. Nothing heavy is imported before a comm
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Sequence
 from typing import Annotated
@@ -72,10 +71,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
         raise
     except KeyboardInterrupt:
         sys.exit(INTERRUPTED)
-    except BrokenPipeError:
-        # Whoever read our output has gone, `neurosym list | head -1` for instance: nothing to say, nothing to flush.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        sys.exit(0)
     except (NeurosymError, OSError, NotImplementedError) as error:
         print(f"neurosym: {error}", file=sys.stderr)
         sys.exit(BAD_INPUT)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from neurosym.planner import Status
 
-#: `doctor` found something amiss.
+#: `doctor` found something amiss; also what typer leaves with when the reader of a pipe has gone.
 UNWELL = 1
 #: Bad input: an option, a file or a name; a message on stderr says which, and what was expected.
 BAD_INPUT = 33
