@@ -70,8 +70,6 @@ def _placements(cells: tuple[Cell, ...], side: int) -> list[NDArray[np.int64]]:
 @cache
 def _covers() -> NDArray[np.int8]:
     """int8 (11520, 27): every way to fill the 3 x 3 x 3 cube; entries are numbers of pieces."""
-    from xcover import covers_bool
-
     rows, owner = [], []
     for number, cells in enumerate(PIECES.values()):
         for placement in _placements(cells, 3):
@@ -85,6 +83,8 @@ def _covers() -> NDArray[np.int8]:
     with warnings.catch_warnings():
         # Of numba, when it first compiles xcover, about a hash in there; it is not the user's business.
         warnings.filterwarnings("ignore", message="unsafe cast from uint64")
+        from xcover import covers_bool
+
         covers = list(covers_bool(matrix))
     for cover in covers:
         filled = np.zeros(27, dtype=np.int8)
