@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self, overload
@@ -181,11 +181,16 @@ class NetworkPrior(Prior):
         self._own = _Weights(fitted.network, header)
         return self
 
-    def save(self, path: str | Path) -> Path:
-        """Write the weights and their header to a ``.safetensors`` file (whole or not at all); returns its path."""
+    def save(self, path: str | Path, *, notes: Mapping[str, Any] | None = None) -> Path:
+        """Write the weights and their header to a ``.safetensors`` file (whole or not at all); returns its path.
+
+        Args:
+            notes: kept in the header under ``"demonstrations"``: where they came from (split, pictures, seed).
+        """
         if self._own is None:
             raise InputError("Expected a prior that was trained, or given weights; this one has none. Call fit first.")
-        save_network(Path(path), self._own.network, self._own.header)
+        header = {**self._own.header, "demonstrations": dict(notes)} if notes else self._own.header
+        save_network(Path(path), self._own.network, header)
         return Path(path)
 
     @torch.inference_mode()

@@ -21,7 +21,7 @@ from neurosym import __version__, benchmark
 from neurosym.benchmark import Comparison, Outcome, Run
 from neurosym.errors import InputError
 from neurosym.family import ProblemFamily
-from neurosym.files import replacing
+from neurosym.files import write_text
 from neurosym.registry import load_domain, load_prior
 
 #: Called with one line about what is going on.
@@ -133,7 +133,7 @@ def train_cell(experiment: Experiment, cell: Cell, out: Path) -> str:
     path.parent.mkdir(parents=True, exist_ok=True)
     checkpoint = path.with_suffix(".checkpoint")
     learner.fit(given, seed=experiment.seed, epochs=experiment.epochs, checkpoint=checkpoint)
-    learner.save(path)
+    learner.save(path, notes={"split": cell.split, "pictures": cell.style, "seed": experiment.seed})
     checkpoint.unlink(missing_ok=True)
     return f"{cell.method}, {cell.style} pictures, split {cell.split}: {learner.header['training']['seconds']:.0f} s"
 
@@ -209,8 +209,8 @@ def _write(
     writer = csv.DictWriter(text, list(asdict(records[0])), lineterminator="\n")
     writer.writeheader()
     writer.writerows(asdict(r) for r in records)
-    _write_text(out / "results.csv", text.getvalue())
-    _write_text(out / "report.md", report(experiment, records))
+    write_text(out / "results.csv", text.getvalue())
+    write_text(out / "report.md", report(experiment, records))
     from neurosym.plotting import iterations_figure, save
 
     for style in experiment.styles:
@@ -278,9 +278,4 @@ def _same_experiment(experiment: Experiment, out: Path) -> None:
             raise InputError(
                 f"Expected {out} to be empty or to hold this experiment, {fixed}; it holds {known}. Name another."
             )
-    _write_text(path, json.dumps(fixed) + "\n")
-
-
-def _write_text(path: Path, content: str) -> None:
-    with replacing(path) as temporary:
-        temporary.write_text(content, encoding="utf-8")
+    write_text(path, json.dumps(fixed) + "\n")

@@ -274,7 +274,7 @@ def test_training_goes_on_after_a_kill(demonstrations, tmp_path, monkeypatch, ca
 
     from learned_priors.network_prior import NetworkPrior
 
-    def killed(*_):
+    def killed(*_, **__):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(NetworkPrior, "save", killed)

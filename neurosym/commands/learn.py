@@ -72,7 +72,8 @@ def train(
     with warnings.catch_warnings():
         warnings.showwarning = lambda message, *_, **__: say(f"Note: {message}")
         _fit(learner, given, seed=seed, epochs=epochs, device=device, checkpoint=checkpoint, resume=resume)
-    learner.save(out)
+    made_here = {"split": split, "pictures": pictures.value, "seed": seed}
+    learner.save(out, notes=made_here if demos_file is None else {"file": demos_file.name})
     checkpoint.unlink(missing_ok=True)
     figures = learner.header.get("training", {}) if hasattr(learner, "header") else {}
     took = f" in {figures['seconds']:.1f} s" if "seconds" in figures else ""

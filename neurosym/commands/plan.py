@@ -25,6 +25,7 @@ from neurosym.commands.common import (
 )
 from neurosym.errors import InputError
 from neurosym.family import ProblemFamily
+from neurosym.geometry.directions import in_words
 
 if TYPE_CHECKING:
     from neurosym.language.domain import Problem
@@ -179,8 +180,9 @@ def _show(problem: Problem, results: Sequence[PlanResult], answer: dict[str, Any
         print(f"The last of {best.iterations} refusals:" if best.blame else "Nothing was refused.")
         for refusal in best.blame[-LAST_REFUSALS:]:
             print(f"  after {joined(refusal.after) or 'nothing'}, not {refusal.action}: {refusal.reason}")
-    counts = f"{best.iterations} iterations, {best.attempts} attempts, {best.expansions} expansions"
-    print(f"{counts}, {1000 * best.seconds:.1f} ms")
+    counts = {"iteration": best.iterations, "attempt": best.attempts, "expansion": best.expansions}
+    said = ", ".join(f"{n} {what}{'' if n == 1 else 's'}" for what, n in counts.items())
+    print(f"{said}, {1000 * best.seconds:.1f} ms")
     for rank, other in enumerate(results[1:], 2):
         cost = "" if other.cost is None else f"  (cost {other.cost:.3f} nats)"
         print(f"plan {rank}: {' '.join(other.plan or ())}{cost}")
@@ -210,5 +212,5 @@ def _how(how: Any) -> str:
     if how is None:
         return ""
     if isinstance(how, tuple | list) or hasattr(how, "tolist"):
-        return f"  along ({', '.join(f'{float(v):g}' for v in how)})" if len(how) == 3 else f"  {how}"
+        return f"  along {in_words(how)}" if len(how) == 3 else f"  {how}"
     return f"  {how}"

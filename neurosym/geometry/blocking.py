@@ -17,6 +17,7 @@ from neurosym.errors import InputError
 from neurosym.geometry import collision
 from neurosym.geometry.assembly import Box
 from neurosym.geometry.contacts import plane_axes
+from neurosym.geometry.directions import in_words
 from neurosym.geometry.sweep import swept_box_hits, triangles_block
 
 if TYPE_CHECKING:
@@ -92,11 +93,7 @@ class BlockingGraph:
 
     def describe(self, direction: int) -> str:
         """A direction in words: ``+z``, or its three numbers."""
-        vector = self.directions[direction]
-        for axis, name in enumerate("xyz"):
-            if abs(abs(vector[axis]) - 1) < 1e-9:
-                return ("+" if vector[axis] > 0 else "-") + name
-        return "(" + ", ".join(f"{v + 0.0:.3g}" for v in vector) + ")"
+        return in_words(self.vectors[direction])
 
     def _bodies_along(self, direction: Array) -> list[int]:
         """One direction: candidate pairs by swept bounds, whole at once, then the exact test on what is left."""
