@@ -107,13 +107,13 @@ def keeps_standing(present: Fluent, rule: str) -> Derived:
                 break
         total = moving.bit_count()
         falling = f"{total} cube{'s' if total > 1 else ''} of {', '.join(because)}"
-        return Verdict(False, because, f"Without {names[number]}, {falling} would {_WORD[rule]}.", tuple(until))
+        return Verdict(False, because, _SAYS[rule].format(names[number], falling), tuple(until), unconditional=True)
 
     return Derived("keeps_standing", present.types, keeps_standing)
 
 
 _STANDS = Verdict(True)
-_WORD = {"cubes": "fall", "strict": "be left over it"}
+_SAYS = {"cubes": "Without {}, {} would fall.", "strict": "Without {}, {} would be left over it."}
 
 
 def _falling(world: Assembly, there: int, removed: int) -> int:

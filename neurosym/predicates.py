@@ -63,7 +63,8 @@ def free(
             for d in range(len(graph.directions))
         )
         until = tuple(Atom(present, (n,)) for n in world.in_mask(witnesses)) if removal else None
-        return Verdict(False, world.in_mask(because), f"{p} is blocked in every direction ({said}).", until)
+        said = f"{p} is blocked in every direction ({said})."
+        return Verdict(False, world.in_mask(because), said, until, unconditional=True)
 
     return Derived("free", [part], ask)
 

@@ -28,6 +28,8 @@ class Verdict:
         until: a promise, for a verdict that does not hold: it will not hold in any later state
             until one of these ground atoms changes. `None` promises nothing; an empty tuple promises
             that it never will. Planners learn from it, so it must be sound.
+        unconditional: a stronger promise: the verdict does not depend on the rest of the state. It does not hold in
+            any state in which the atoms of `until` are as they are now, whether or not it comes after this one.
         how: for a verdict that holds, how the action may be done (a direction, a path), kept in the plan.
     """
 
@@ -36,6 +38,7 @@ class Verdict:
     reason: str = ""
     until: tuple[Atom, ...] | None = None
     how: Any = None
+    unconditional: bool = False
 
     def __bool__(self) -> bool:
         return self.holds
@@ -59,11 +62,14 @@ class Rejection:
         until: indices of actions. A promise: the action stays refused in every state reached from this
             one until one of these is done. Empty promises nothing. An action that can never succeed
             names itself. Planners prune by it, so it must be sound.
+        unconditional: the promise holds in every state of the problem before one of `until` is done, not only in
+            those reached from this one: what was learned in one branch of a search serves in all.
     """
 
     reason: str
     because: tuple[str, ...] = ()
     until: tuple[int, ...] = ()
+    unconditional: bool = False
 
 
 class SearchProblem(Protocol[S]):

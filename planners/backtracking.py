@@ -17,7 +17,7 @@ from neurosym.planner import Budget, Planner, PlannerTraits, PlanResult, SearchL
 from neurosym.prior import OrderScores
 from neurosym.problem import Rejection, SearchProblem, Step
 from planners.completion import RESOLUTION, Completion, remainder, with_first
-from planners.evidence import Names, fitted, promise, representatives
+from planners.evidence import Lessons, Names, fitted, promise, representatives
 
 S = TypeVar("S", bound=Hashable)
 
@@ -69,6 +69,7 @@ class _Search(Generic[S]):
         self.agenda: list[int] = []  # named by refusals, the latest first
         self.promises: dict[int, list[int]] = {}  # action -> masks, of all frames on the path
         self.answers: dict[tuple[S, int], Step[S] | Rejection] = {}
+        self.lessons = Lessons()
         self.dead: set[tuple[S, int]] = set()
         self.path: list[_Frame[S]] = []
         self.prefix: list[int] = []
@@ -127,6 +128,7 @@ class _Search(Generic[S]):
             self.deviated = True
 
     def _learn(self, frame: _Frame[S], action: int, rejection: Rejection) -> None:
+        self.lessons.learn(action, rejection)
         mask = promise(rejection, frame.used)
         if mask is not None:
             self.promises.setdefault(action, []).append(mask)
@@ -135,7 +137,9 @@ class _Search(Generic[S]):
         self.agenda = named + [a for a in self.agenda if a not in named]
 
     def _refuted(self, frame: _Frame[S], action: int) -> bool:
-        """Whether a refusal higher up on the path promises that `action` would be refused here."""
+        """Whether a refusal higher up on the path, or an unconditional one, promises that `action` is refused here."""
+        if self.lessons.refute(action, frame.used):
+            return True
         return any(not mask & frame.used for mask in self.promises.get(action, ()))
 
     def _choose(self, frame: _Frame[S]) -> int | None:

@@ -21,7 +21,7 @@ from neurosym.planner import Budget, Planner, PlannerTraits, PlanResult, SearchL
 from neurosym.prior import OrderScores
 from neurosym.problem import Rejection, SearchProblem, Step
 from planners.completion import RESOLUTION, Completion, remainder, with_first
-from planners.evidence import fitted, promise, representatives
+from planners.evidence import Lessons, fitted, promise, representatives
 from planners.priorities import Outlook, Priority, astar, greedy, levin, weighted
 
 S = TypeVar("S", bound=Hashable)
@@ -153,6 +153,7 @@ class _Search(Generic[S]):
         self.pushed = 0
         self.expanded: Counter[tuple[S, int]] = Counter()
         self.answers: dict[tuple[S, int], Step[S] | Rejection] = {}
+        self.lessons = Lessons()
 
     def plans(self) -> Iterator[PlanResult]:
         """Plans in the order of the priority. When it ends, `out_of_budget` says whether that proves anything."""
@@ -169,7 +170,7 @@ class _Search(Generic[S]):
                 yield self._result(node)
             elif action == _SIBLINGS:
                 self._queue_all(node)
-            elif not node.refutes(action):
+            elif not node.refutes(action) and not self.lessons.refute(action, node.used):
                 child = self._attempt(node, action, key)
                 if self.out_of_budget:
                     return
@@ -197,6 +198,7 @@ class _Search(Generic[S]):
             answer = self.log.attempt(tuple(node.trace()[0]), node.state, action)
             self.answers[known] = answer
         if isinstance(answer, Rejection):
+            self.lessons.learn(action, answer)
             mask = promise(answer, node.used)
             if mask is not None:
                 node.promises[action] = mask

@@ -39,6 +39,22 @@ def promise(rejection: Rejection, used: int) -> int | None:
     return mask & ~used
 
 
+class Lessons:
+    """What unconditional refusals taught: these actions are refused everywhere until one of those is done."""
+
+    def __init__(self) -> None:
+        self._masks: dict[int, set[int]] = {}
+
+    def learn(self, action: int, rejection: Rejection) -> None:
+        """Keep the promise of a refusal, if it is unconditional."""
+        if rejection.unconditional and rejection.until:
+            self._masks.setdefault(action, set()).add(sum(1 << a for a in set(rejection.until)))
+
+    def refute(self, action: int, used: int) -> bool:
+        """Whether `action` is known to be refused in every state reached by the actions in `used`."""
+        return any(not mask & used for mask in self._masks.get(action, ()))
+
+
 class Names:
     """Finds the actions that a refusal names: those of its promise, and those that its objects occur in."""
 

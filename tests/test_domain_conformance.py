@@ -49,6 +49,16 @@ def test_a_broken_promise_is_caught():
         check_problem(problem_with(liar), walks=20)
 
 
+def test_an_unconditional_promise_that_depends_on_the_state_is_caught():
+    def conditional(world, state, name):
+        # Without b, a waits for c; with b, it does not: what it says of c depends on the rest of the state.
+        refused = name == "a" and state.holds(there("c")) and not state.holds(there("b"))
+        return ns.Verdict(not refused, (), "c is in the way", (there("c"),), unconditional=True)
+
+    with pytest.raises(ns.ContractError, match="unconditionally"):
+        check_problem(problem_with(conditional), walks=40)
+
+
 def test_an_oracle_that_changes_its_mind_is_caught():
     rng = np.random.default_rng(0)
 

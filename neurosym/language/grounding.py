@@ -65,7 +65,7 @@ class GroundProblem:
         self._done_bits = done
         self.classes: tuple[int, ...] = self._classes(all_names, {a for pair in precedence for a in pair})
         self._touching: dict[Atom, tuple[int, ...]] = {}
-        self._promises: dict[tuple[Atom, ...], tuple[int, ...]] = {}
+        self._promises: dict[tuple[Atom, ...], tuple[tuple[int, ...], int]] = {}
         for i, instance in enumerate(reachable):
             for effect in instance.eff:
                 self._touching[effect.atom] = (*self._touching.get(effect.atom, ()), i)
@@ -99,7 +99,7 @@ class GroundProblem:
         for predicate, args, positive in self._derived[action]:
             verdict = _ask(predicate, self.world, view, args)
             if verdict.holds is not positive:
-                return self._rejection(action, predicate, args, positive, verdict)
+                return self._rejection(state, action, predicate, args, positive, verdict)
             if how is None:
                 how = verdict.how
         return Step(self.apply(state, action), how)
@@ -123,17 +123,21 @@ class GroundProblem:
         return Rejection(f"{self.actions[action]} is not applicable: it needs {', '.join(missing)}.")
 
     def _rejection(
-        self, action: int, predicate: Derived, args: tuple[str, ...], positive: bool, verdict: Verdict
+        self, state: int, action: int, predicate: Derived, args: tuple[str, ...], positive: bool, verdict: Verdict
     ) -> Rejection:
         said = verdict.reason or f"{predicate}({', '.join(args)}) {'does not hold' if positive else 'holds'}."
         # A promise speaks of a verdict that stays false; it says nothing of one that must become false.
         if not positive or verdict.until is None:
             return Rejection(said, verdict.because, ())
-        until = self._promises.get(verdict.until)
-        if until is None:
+        known = self._promises.get(verdict.until)
+        if known is None:
             touching = {a for atom in verdict.until for a in self._touching.get(atom, ())}
-            until = self._promises[verdict.until] = tuple(sorted(touching))
-        return Rejection(said, verdict.because, until or (action,))
+            atoms = self._mask(atom for atom in verdict.until if atom in self._bits)
+            known = self._promises[verdict.until] = tuple(sorted(touching)), atoms
+        until, atoms = known
+        # Before any of `until` is done the atoms are as at first: only if they are so now does the verdict speak of it.
+        unconditional = verdict.unconditional and not (state ^ self.initial) & atoms
+        return Rejection(said, verdict.because, until or (action,), unconditional)
 
     # -- construction -----------------------------------------------------------------------------------------
 

@@ -68,11 +68,18 @@ def check_problem(problem: Problem, *, walks: int = 4, rng: np.random.Generator 
     _require(len(search.classes) == len(search.actions), f"{label} to have a class an action")
     _require(problem.actions == tuple(search.actions), f"{label} to list the actions that planners see")
     hash(search.initial)
+    lessons: list[tuple[int, Rejection]] = []
     for _ in range(walks):
-        _walk(problem, search, chance, label)
+        _walk(problem, search, chance, label, lessons)
 
 
-def _walk(problem: Problem, search: SearchProblem[Any], rng: np.random.Generator, label: str) -> None:
+def _walk(
+    problem: Problem,
+    search: SearchProblem[Any],
+    rng: np.random.Generator,
+    label: str,
+    lessons: list[tuple[int, Rejection]],
+) -> None:
     """A random walk: every refusal on it must keep its promise for the rest of it."""
     state = search.initial
     done: list[int] = []
@@ -93,7 +100,17 @@ def _walk(problem: Problem, search: SearchProblem[Any], rng: np.random.Generator
                     f"{[search.actions[u] for u in until]} is done ({refusal.reason}); it was allowed after "
                     f"{[search.actions[b] for b in done]}. Make `until` larger, or None."
                 )
+            for learned, refusal in lessons:
+                broken = learned == a and isinstance(answer, Step) and not set(refusal.until) & set(done)
+                _require(
+                    not broken,
+                    f"{label} to refuse {search.actions[a]} in every state before one of "
+                    f"{[search.actions[u] for u in refusal.until]}, since it said so unconditionally",
+                    f"it was allowed after {[search.actions[b] for b in done]}",
+                )
             if isinstance(answer, Rejection):
+                if answer.unconditional and answer.until:
+                    lessons.append((a, answer))
                 _require(bool(answer.reason), f"{label} to give a reason for each refusal", search.actions[a])
                 if answer.until:
                     standing[a] = (set(answer.until), answer)

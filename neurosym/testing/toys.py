@@ -120,7 +120,7 @@ class Removal:
         # One blocker a direction: while they all stay, so does the part.
         first = dict.fromkeys((way & -way).bit_length() - 1 for way in present)
         names = tuple(self.actions[p] for p in first)
-        return Rejection("Blocked in every direction.", names, tuple(first) if self.promises else ())
+        return Rejection("Blocked in every direction.", names, tuple(first) if self.promises else (), self.promises)
 
 
 @dataclass(frozen=True)
@@ -222,7 +222,8 @@ class Relabelled(Generic[S]):
     def attempt(self, state: S, action: int) -> Step[S] | Rejection:
         answer = self.problem.attempt(state, self.order[action])
         if isinstance(answer, Rejection):
-            return Rejection(answer.reason, answer.because, tuple(self.order.index(a) for a in answer.until))
+            until = tuple(self.order.index(a) for a in answer.until)
+            return Rejection(answer.reason, answer.because, until, answer.unconditional)
         return answer
 
 
