@@ -320,6 +320,29 @@ def test_the_simulator_in_the_loop_plans_too(rule):
     assert ns.solve(problem, oracle="physics", rng=1).plan == result.plan
 
 
+def test_cubes_agrees_with_pybullet():
+    """The same first failure, in random orders and in such as fail late (benchmarks/physics_agreement.py asks more)."""
+    from neurosym.pipeline import open_oracle
+
+    rng = np.random.default_rng(7)
+    for k in range(10):
+        problem = soma.problem(int(rng.integers(240)))
+        order = [LETTERS[a] for a in rng.permutation(7)]
+        if k % 2:
+            order = list(ns.solve(problem, rng=k).plan)
+            i, j = rng.choice(7, 2, replace=False)
+            order[i], order[j] = order[j], order[i]
+        with open_oracle(problem, "physics") as search:
+            state, failed = search.initial, None
+            for step, name in enumerate(order):
+                answer = search.attempt(state, search.actions.index(name))
+                if isinstance(answer, ns.Rejection):
+                    failed = step
+                    break
+                state = answer.state
+        assert failed == first_failure(problem, order)
+
+
 def test_physics_judges_no_rule_that_is_not_physical():
     with pytest.raises(ns.InputError, match="physics"):
         ns.solve(soma.problem(17, collapse="strict"), oracle="physics")

@@ -48,6 +48,9 @@ def train(
     seed: Annotated[int, typer.Option("--seed", min=0, metavar="K", help="Of the pictures and the training.")] = 0,
     pictures: PictureStyle = Pictures.clean,
     epochs: Annotated[int | None, typer.Option("--epochs", min=1, help="Default the recipe's.")] = None,
+    encoder: Annotated[
+        str | None, typer.Option("--encoder", metavar="NAME", help="small (default) or paper, the paper's CNN.")
+    ] = None,
     device: Annotated[str, typer.Option("--device", help="cpu or cuda.")] = "cpu",
     resume: Annotated[bool, typer.Option("--resume/--no-resume", help="Go on from a run that was killed.")] = True,
 ) -> None:
@@ -56,7 +59,7 @@ def train(
 
     _check_suffix(out, ".safetensors")
     load_domain(domain)
-    learner: Any = load_prior(prior)
+    learner: Any = load_prior(prior, **({"encoder": encoder} if encoder else {}))
     if not (hasattr(learner, "fit") and hasattr(learner, "save")):
         raise InputError(f"Expected a prior that can be trained; {prior!r} cannot (it has no fit and save).")
     if demos_file is not None:
