@@ -36,7 +36,8 @@ def test_every_block_of_python_runs(readme, capsys):
         exec(compile(block, "README.md", "exec"), names)
     taken_apart = ns.solve(names["problem"])
     assert taken_apart.solved
-    assert taken_apart.plan[0] == "remove(seat)"
+    # Three legs carry the seat, two do not: at most one leg leaves before it.
+    assert taken_apart.plan.index("remove(seat)") <= 1
 
 
 def test_the_table_was_made_by_its_command(readme):
