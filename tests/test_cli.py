@@ -12,7 +12,7 @@ import pytest
 import neurosym as ns
 from neurosym import __version__
 from neurosym.cli import main
-from neurosym.exit_codes import EXIT_CODES, INTERRUPTED
+from neurosym.exit_codes import BAD_INPUT, EXIT_CODES, INTERRUPTED
 
 #: The L before all others: under the rule `cubes` no order of cube 17 can.
 IMPOSSIBLE = [part for other in "VTZABP" for part in ("--before", f"L,{other}")]
@@ -288,3 +288,13 @@ def test_training_goes_on_after_a_kill(demonstrations, tmp_path, monkeypatch, ca
     weights.write_bytes(whole)
     pictures = ns.Demonstrations.load(demonstrations).pictures[0]
     assert np.array_equal(again.read(pictures).log_prob, ns.load_prior(weights).read(pictures).log_prob)
+
+
+def test_options_of_a_family_reach_its_problems(capsys):
+    assert call("plan", "soma", "--problem", "3", "--option", 'removed=["V"]', "--json") == 0
+    assert "V" not in json.loads(capsys.readouterr().out)["plan"]
+    for wrong, says in (("removed", "KEY=VALUE"), ("colour=red", "colour")):
+        assert call("compare", "soma", "--problems", "1", "--prior", "none", "--option", wrong) == BAD_INPUT
+        assert says in capsys.readouterr().err
+    assert call("demos", "soma", "--out", "x.npz", "--option", "colour=red") == BAD_INPUT
+    assert "colour" in capsys.readouterr().err

@@ -6,7 +6,7 @@ import inspect
 import json
 import os
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from enum import StrEnum
 from pathlib import Path
@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from neurosym.errors import InputError
 from neurosym.family import ProblemFamily, Progress
 from neurosym.files import write_text
 
@@ -45,6 +46,10 @@ CollapseRule = Annotated[
 OracleName = Annotated[Oracle, typer.Option("--oracle", help="What answers attempts.")]
 PictureStyle = Annotated[Pictures, typer.Option("--pictures", help="Style of the pictures.")]
 Split = Annotated[int, typer.Option("--split", min=0, metavar="S", help="Which random split into train and test.")]
+FamilyOptions = Annotated[
+    list[str] | None,
+    typer.Option("--option", metavar="KEY=VALUE", help="An option of the family's problems. May be repeated."),
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object to stdout, and nothing else.")]
 
 
@@ -80,6 +85,25 @@ def problem_options(family: ProblemFamily, **wanted: Any) -> dict[str, Any]:
         elif name in taken and taken[name].default is not inspect.Parameter.empty:
             found[name] = taken[name].default
     return found
+
+
+def family_options(given: Sequence[str] | None) -> dict[str, Any]:
+    """``KEY=VALUE`` as the family's own options: a value that is JSON (a number, true, a list) is read as such."""
+    found: dict[str, Any] = {}
+    for text in given or ():
+        key, equals, value = text.partition("=")
+        if not equals or not key.isidentifier():
+            raise InputError(f"Expected an option as KEY=VALUE, for instance variant=unique; got {text!r}.")
+        try:
+            found[key] = json.loads(value)
+        except ValueError:
+            found[key] = value
+    return found
+
+
+def taken_by(function: Callable[..., Any], options: Mapping[str, Any]) -> dict[str, Any]:
+    """Those of the options that a function takes by name."""
+    return {k: v for k, v in options.items() if k in inspect.signature(function).parameters}
 
 
 @contextmanager

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -13,6 +13,7 @@ from neurosym.commands.common import (
     AsJson,
     CollapseRule,
     DomainName,
+    FamilyOptions,
     Oracle,
     OracleName,
     Pictures,
@@ -21,10 +22,12 @@ from neurosym.commands.common import (
     Split,
     console,
     cores,
+    family_options,
     print_json,
     problem_options,
     progress_bar,
     say,
+    taken_by,
 )
 from neurosym.errors import InputError, UnknownNameError
 from neurosym.family import ProblemFamily
@@ -50,6 +53,7 @@ def compare(
     ] = None,
     prior: PriorNames = None,
     collapse: CollapseRule = None,
+    option: FamilyOptions = None,
     oracle: OracleName = Oracle.geometry,
     seeds: Annotated[int, typer.Option("--seeds", min=1, metavar="K", help="Solve each problem K times.")] = 1,
     out: Annotated[
@@ -71,14 +75,15 @@ def compare(
     from neurosym.reporting import rows
 
     family = load_domain(domain)
+    own = family_options(option)
     folder = out if out is not None or as_json else Path("out") / f"compare-{domain}"
     processes = workers or cores()
     comparison = Comparison(
         domain=domain,
-        numbers=_numbers(family, problems, split),
+        numbers=_numbers(family, problems, split, own),
         planners=_once(planner or PLANNERS),
         priors=_once(prior or PRIORS),
-        options=problem_options(family, collapse=collapse, pictures=_style(family, pictures)),
+        options=problem_options(family, collapse=collapse, pictures=_style(family, pictures)) | own,
         oracle=oracle.value,
         seeds=seeds,
     )
@@ -97,15 +102,17 @@ def compare(
     _show(outcome, table, family, folder)
 
 
-def _numbers(family: ProblemFamily, problems: str, split: int) -> tuple[int, ...]:
+def _numbers(family: ProblemFamily, problems: str, split: int, options: Mapping[str, Any]) -> tuple[int, ...]:
+    # Which problems there are may depend on the options, too: a variant, how many tiles.
+    own = taken_by(family.numbers, options)
     if problems.isdecimal() and int(problems) > 0:
-        test = tuple(family.numbers("test", split=split))
+        test = tuple(family.numbers("test", split=split, **own))
         if int(problems) > len(test):
             raise InputError(f"Expected at most {len(test)} problems, as many as the test part has; got {problems}.")
         return test[: int(problems)]
     if problems not in PARTS:
         raise UnknownNameError("part", problems, PARTS, hint="A number N above 0 takes the first N of the test part.")
-    return tuple(family.numbers(problems, split=split))
+    return tuple(family.numbers(problems, split=split, **own))
 
 
 def _style(family: ProblemFamily, pictures: Pictures) -> str | None:

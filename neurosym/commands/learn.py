@@ -8,7 +8,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from neurosym.commands.common import DomainName, Pictures, PictureStyle, Split, progress_bar, say
+from neurosym.commands.common import (
+    DomainName,
+    FamilyOptions,
+    Pictures,
+    PictureStyle,
+    Split,
+    family_options,
+    progress_bar,
+    say,
+    taken_by,
+)
 from neurosym.errors import InputError
 
 if TYPE_CHECKING:
@@ -26,10 +36,11 @@ def demos(
     split: Split = 0,
     pictures: PictureStyle = Pictures.clean,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Of the pictures.")] = 0,
+    option: FamilyOptions = None,
 ) -> None:
     """Write demonstrations of a domain: pictures, orders and shares of valid orders."""
     _check_suffix(out, ".npz")
-    made = _demonstrations(domain, part, split, recipe, pictures, seed)
+    made = _demonstrations(domain, part, split, recipe, pictures, seed, family_options(option))
     made.save(out)
     m, views, height, width, _ = made.pictures.shape
     shares = "with" if made.marginals is not None else "without"
@@ -52,6 +63,7 @@ def train(
         str | None, typer.Option("--encoder", metavar="NAME", help="small (default) or paper, the paper's CNN.")
     ] = None,
     device: Annotated[str, typer.Option("--device", help="cpu or cuda.")] = "cpu",
+    option: FamilyOptions = None,
     resume: Annotated[bool, typer.Option("--resume/--no-resume", help="Go on from a run that was killed.")] = True,
 ) -> None:
     """Train a prior, with early figures; a run that was killed goes on where it was."""
@@ -67,7 +79,8 @@ def train(
 
         given = Demonstrations.load(demos_file)
     else:
-        given = _demonstrations(domain, "train", split, "paper" if prior.endswith(PAPER) else "full", pictures, seed)
+        recipe = "paper" if prior.endswith(PAPER) else "full"
+        given = _demonstrations(domain, "train", split, recipe, pictures, seed, family_options(option))
     checkpoint = out.with_suffix(".checkpoint")
     if checkpoint.exists():
         say(f"Going on from {checkpoint}." if resume else f"Starting over; {checkpoint} is replaced.")
@@ -106,14 +119,17 @@ def _fit(learner: Any, given: Demonstrations, **options: Any) -> None:
 
 
 def _demonstrations(
-    domain: str, part: str, split: int, recipe: str, pictures: Pictures, seed: int
+    domain: str, part: str, split: int, recipe: str, pictures: Pictures, seed: int, options: dict[str, Any]
 ) -> Demonstrations:
     from neurosym.registry import load_domain
 
     family = load_domain(domain)
+    strange = sorted(set(options) - set(taken_by(family.demonstrations, options)))
+    if strange:
+        raise InputError(f"Expected options that demonstrations of {domain!r} take; got {', '.join(strange)}.")
     with progress_bar("demonstrations") as progress:
         return family.demonstrations(
-            part, split=split, recipe=recipe, style=pictures.value, seed=seed, progress=progress
+            part, split=split, recipe=recipe, style=pictures.value, seed=seed, progress=progress, **options
         )
 
 

@@ -14,10 +14,12 @@ from neurosym.commands.common import (
     AsJson,
     CollapseRule,
     DomainName,
+    FamilyOptions,
     Oracle,
     OracleName,
     Pictures,
     PictureStyle,
+    family_options,
     joined,
     print_json,
     problem_options,
@@ -50,6 +52,7 @@ def plan(
     prior: Annotated[
         str, typer.Option("--prior", metavar="Q", help="Name of a prior, a weights file, or `none`.")
     ] = "none",
+    option: FamilyOptions = None,
     collapse: CollapseRule = None,
     oracle: OracleName = Oracle.geometry,
     pictures: PictureStyle = Pictures.clean,
@@ -80,7 +83,7 @@ def plan(
         pictures=None if pictures is Pictures.clean else pictures.value,
         before=[_pair(text) for text in before] if before else None,
         removed=removed or None,
-    )
+    ) | family_options(option)
     problem = _problem(family, number, cells, options)
     chosen = planner or ("backtracking" if k is None else "best-first")
     budget = Budget(seconds=seconds, attempts=attempts, expansions=expansions)
