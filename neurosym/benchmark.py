@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 NO_PRIOR = "none"
 
 #: Raise it whenever the same comparison would give other runs, so that no journal answers for it.
-RUNS_VERSION = 2
+RUNS_VERSION = 3
 
 Cell = tuple[str, str, int]
 

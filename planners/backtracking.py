@@ -17,7 +17,7 @@ from neurosym.planner import Budget, Planner, PlannerTraits, PlanResult, SearchL
 from neurosym.prior import OrderScores
 from neurosym.problem import Rejection, SearchProblem, Step
 from planners.completion import RESOLUTION, Completion, remainder, with_first
-from planners.evidence import Lessons, Names, fitted, promise, representatives
+from planners.evidence import Lessons, Names, agenda, fitted, promise, representatives
 
 S = TypeVar("S", bound=Hashable)
 
@@ -133,8 +133,7 @@ class _Search(Generic[S]):
         if mask is not None:
             self.promises.setdefault(action, []).append(mask)
             frame.promised.append(action)
-        named = [a for a in self.named(rejection) if a != action and not frame.used >> a & 1]
-        self.agenda = named + [a for a in self.agenda if a not in named]
+        self.agenda = agenda(self.named(rejection), self.agenda, frame.used | 1 << action)
 
     def _refuted(self, frame: _Frame[S], action: int) -> bool:
         """Whether a refusal higher up on the path, or an unconditional one, promises that `action` is refused here."""

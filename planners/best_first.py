@@ -21,7 +21,7 @@ from neurosym.planner import Budget, Planner, PlannerTraits, PlanResult, SearchL
 from neurosym.prior import OrderScores
 from neurosym.problem import Rejection, SearchProblem, Step
 from planners.completion import RESOLUTION, Completion, remainder, with_first
-from planners.evidence import Lessons, fitted, promise, representatives
+from planners.evidence import Lessons, Names, agenda, fitted, promise, representatives
 from planners.priorities import Outlook, Priority, astar, greedy, levin, weighted
 
 S = TypeVar("S", bound=Hashable)
@@ -154,6 +154,8 @@ class _Search(Generic[S]):
         self.expanded: Counter[tuple[S, int]] = Counter()
         self.answers: dict[tuple[S, int], Step[S] | Rejection] = {}
         self.lessons = Lessons()
+        self.named = Names(problem)
+        self.agenda: list[int] = []  # named by refusals, the latest first
 
     def plans(self) -> Iterator[PlanResult]:
         """Plans in the order of the priority. When it ends, `out_of_budget` says whether that proves anything."""
@@ -199,6 +201,7 @@ class _Search(Generic[S]):
             self.answers[known] = answer
         if isinstance(answer, Rejection):
             self.lessons.learn(action, answer)
+            self.agenda = agenda(self.named(answer), self.agenda, node.used | 1 << action)
             mask = promise(answer, node.used)
             if mask is not None:
                 node.promises[action] = mask
@@ -249,8 +252,10 @@ class _Search(Generic[S]):
         node.waiting = []
 
     def _queue_one(self, node: _Node[S]) -> None:
-        """Where nothing is preferred, one at random; the siblings wait for as long as it leads on."""
-        chosen = int(self.rng.integers(len(node.waiting)))
+        """Where nothing is preferred, what refusals named last, then at random; siblings wait while it leads on."""
+        chosen = next((node.waiting.index(a) for a in self.agenda if a in node.waiting), None)
+        if chosen is None:
+            chosen = int(self.rng.integers(len(node.waiting)))
         node.waiting[chosen], node.waiting[-1] = node.waiting[-1], node.waiting[chosen]
         action = node.waiting.pop()
         bound = 0.0

@@ -73,6 +73,12 @@ class Names:
         return list(dict.fromkeys(named))
 
 
+def agenda(named: Sequence[int], before: Sequence[int], gone: int) -> list[int]:
+    """What to try next: the actions that the latest refusal named, then those named before; none that is `gone`."""
+    fresh = [a for a in named if not gone >> a & 1]
+    return fresh + [a for a in before if a not in fresh]
+
+
 def fitted(problem: SearchProblem[S], scores: OrderScores | None) -> OrderScores | None:
     """The scores, checked against the problem's actions, with interchangeable actions sharing their probability.
 

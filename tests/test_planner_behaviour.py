@@ -104,11 +104,11 @@ def test_promises_are_believed(planner) -> None:
         assert result.iterations <= 7, "one refusal for each part that has something above it"
 
 
-def test_backtracking_tries_next_what_a_refusal_names() -> None:
+@pytest.mark.parametrize("planner", [Backtracking(), BestFirst()])
+def test_what_a_refusal_names_is_tried_next(planner) -> None:
     """No promises, but evidence: the named part is the one to ask for, and the way back is known then."""
     for rng in rngs(20):
-        assert Backtracking().plan(stack(8, promises=False), rng=rng).iterations <= 7
-    assert np.mean([BestFirst().plan(stack(8, promises=False), rng=rng).iterations for rng in rngs(20)]) > 9
+        assert planner.plan(stack(8, promises=False), rng=rng).iterations <= 7
 
 
 def test_names_are_found_inside_the_names_of_actions() -> None:
