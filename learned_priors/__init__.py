@@ -1,4 +1,4 @@
-"""Priors learned from pictures of finished work: Sinkhorn and temporal convolutional networks, and their training.
+"""Priors learned from pictures of finished work: Sinkhorn, temporal and plain networks, and their training.
 
 Importing this package loads nothing; names resolve on first use (PEP 562), so that a command which needs no
 network does not wait for torch.

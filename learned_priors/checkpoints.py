@@ -52,7 +52,7 @@ def save_network(path: Path, network: OrderNetwork, header: Mapping[str, Any]) -
     """Write a network's weights in float16 (`fit` rounds them to it, so nothing is lost) and its header."""
     if path.suffix != ".safetensors":
         raise CheckpointError(f"Expected a file name that ends in .safetensors; got {path.name!r}.")
-    tensors = {name: tensor.to(torch.float16) for name, tensor in network.state_dict().items()}
+    tensors = {name: _cast(tensor, torch.float16) for name, tensor in network.state_dict().items()}
     write_tensors(path, tensors, {**header, "network": network.config.to_json()})
 
 
@@ -80,6 +80,11 @@ def load_network(path: Path) -> tuple[OrderNetwork, dict[str, Any]]:
         )
     if not all(bool(torch.isfinite(tensor).all()) for tensor in tensors.values()):
         raise CheckpointError(f"Expected finite weights in {path}; some are not. Train again.")
-    network.load_state_dict({name: tensor.to(torch.float32) for name, tensor in tensors.items()}, assign=True)
+    network.load_state_dict({name: _cast(tensor, torch.float32) for name, tensor in tensors.items()}, assign=True)
     network.requires_grad_(False)
     return network.eval(), header
+
+
+def _cast(tensor: Tensor, dtype: torch.dtype) -> Tensor:
+    """In another precision; counters stay integers."""
+    return tensor.to(dtype) if tensor.is_floating_point() else tensor

@@ -13,7 +13,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from neurosym.errors import InputError, UnknownNameError
+from neurosym.errors import InputError, MissingDependencyError, UnknownNameError
 
 #: (V, H, W, 3): views, height, width, colours.
 PictureShape = tuple[int, int, int, int]
@@ -108,13 +108,67 @@ class PaperEncoder(Encoder):
         self.dense = nn.Sequential(nn.Dropout(dropout), nn.Linear(256 * left[0] * left[1], out_features), nn.ReLU())
 
     def prepare(self, pictures: Tensor) -> Tensor:
-        # Kept as bytes: thousands of pictures stay resident while a network learns.
-        return pictures.permute(0, 1, 4, 2, 3).flatten(1, 2).contiguous()
+        return _channels(pictures)
 
     def forward(self, prepared: Tensor) -> Tensor:
         x = (prepared.to(torch.float32) - _CENTRE) / _SCALE
         features: Tensor = self.dense(self.convolutions(x).flatten(1))
         return features
+
+
+class ResNetEncoder(Encoder):
+    """ResNet18 (He et al., CVPR 2016) of torchvision, untrained, views stacked as channels.
+
+    Made for pictures of 224 pixels, it shrinks them 32 times. Here the first strides are left out, the pooling one
+    and then that of the first convolution, until at least 4 x 4 places are left: 64 pixels are shrunk 16 times.
+
+    Raises:
+        MissingDependencyError: torchvision is not installed.
+    """
+
+    LEAST = 16  #: pixels; below, less than 2 x 2 places are left
+    PLACES = 4
+
+    def __init__(self, shape: PictureShape) -> None:
+        super().__init__()
+        try:
+            from torchvision.models import resnet18
+        except ImportError:
+            raise MissingDependencyError(
+                "Expected torchvision for the encoder 'resnet18'; it is not installed. "
+                "Install this package with its extra `vision`, or use encoder='small' or 'paper'."
+            ) from None
+        views, height, width, colours = shape
+        side = min(height, width)
+        if side < self.LEAST:
+            raise InputError(
+                f"Expected pictures of at least {self.LEAST} x {self.LEAST} pixels for the encoder 'resnet18'; "
+                f"got {height} x {width}. Use encoder='small', or larger pictures."
+            )
+        network: nn.Module = resnet18(weights=None)
+        self.out_features = 512
+        pooled, halved = side >= 32 * self.PLACES, side >= 16 * self.PLACES
+        kernel, stride = (7, 2) if pooled else (3, 2) if halved else (3, 1)
+        network.conv1 = nn.Conv2d(views * colours, 64, kernel, stride, padding=kernel // 2, bias=False)
+        if not pooled:
+            network.maxpool = nn.Identity()
+        network.fc = nn.Identity()
+        self.network = network
+
+    def prepare(self, pictures: Tensor) -> Tensor:
+        return _channels(pictures)
+
+    def forward(self, prepared: Tensor) -> Tensor:
+        features: Tensor = self.network((prepared.to(torch.float32) - _CENTRE) / _SCALE)
+        return features
+
+
+def _channels(pictures: Tensor) -> Tensor:
+    """Views stacked as channels: uint8 (B, V, H, W, 3) -> uint8 (B, 3 V, H, W).
+
+    Kept as bytes: thousands of pictures stay resident while a network learns.
+    """
+    return pictures.permute(0, 1, 4, 2, 3).flatten(1, 2).contiguous()
 
 
 def _pooled(views: Tensor, side: int) -> Tensor:
@@ -136,7 +190,7 @@ def _pooled(views: Tensor, side: int) -> Tensor:
 #: A factory takes the picture shape and gives an encoder.
 EncoderFactory = Callable[[PictureShape], Encoder]
 
-_ENCODERS: dict[str, EncoderFactory] = {"small": SmallEncoder, "paper": PaperEncoder}
+_ENCODERS: dict[str, EncoderFactory] = {"small": SmallEncoder, "paper": PaperEncoder, "resnet18": ResNetEncoder}
 
 
 def register_encoder(name: str, factory: EncoderFactory) -> None:

@@ -13,7 +13,7 @@ from torch import Tensor
 
 from learned_priors.losses import loss_of, targets_of
 from learned_priors.metrics import whole_order_accuracy
-from learned_priors.networks import NetworkConfig, OrderNetwork
+from learned_priors.networks import Logits, NetworkConfig, OrderNetwork
 from learned_priors.recipes import TrainConfig
 from neurosym.demonstrations import Demonstrations
 from neurosym.errors import InputError
@@ -58,8 +58,8 @@ class Learner:
         self.network.train()
         i = torch.from_numpy(index).to(self.device)
         with _seeded(_seed_of(self.seed, _NOISE, done), self.device), self._autocast():
-            logits = self.network(self.prepared[i])
-            loss = loss_of(logits.float(), self.target[i], self.config)
+            logits: Logits = self.network(self.prepared[i])
+            loss = loss_of(logits.to(torch.float32), self.target[i], self.config)
         value = float(loss.detach())
         if not math.isfinite(value):
             raise InputError(
@@ -76,12 +76,20 @@ class Learner:
         self.network.eval()
         i = torch.from_numpy(index).to(self.device)
         with _seeded(_seed_of(self.seed, _NOISE, 0), self.device), self._autocast():
-            logits = torch.cat([self.network(self.prepared[part]) for part in torch.split(i, CHUNK)]).float()
+            logits = Logits.joined([self.network(self.prepared[part]) for part in torch.split(i, CHUNK)])
+            logits = logits.to(torch.float32)
             loss = float(loss_of(logits, self.target[i], self.config))
         table = self.network.log_prob(logits).cpu().numpy()
+        length = self.network.log_length(logits)
         demos = self.demonstrations
         soft = demos.marginals[index] if self.config.soft and demos.marginals is not None else None
-        right = whole_order_accuracy(table, demos.sequences[index], marginals=soft, classes=self.config.classes)
+        right = whole_order_accuracy(
+            table,
+            demos.sequences[index],
+            log_length=None if length is None else length.cpu().numpy(),
+            marginals=soft,
+            classes=self.config.classes,
+        )
         return loss, right
 
     def _autocast(self) -> torch.autocast:

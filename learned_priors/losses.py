@@ -8,6 +8,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
+from learned_priors.networks import Logits
 from learned_priors.recipes import TrainConfig
 from learned_priors.sinkhorn import gumbel_sinkhorn, log_sinkhorn
 
@@ -61,11 +62,28 @@ def squared_error(log_samples: Tensor, target: Tensor) -> Tensor:
     return off.sum() / entries
 
 
-def loss_of(logits: Tensor, target: Tensor, config: TrainConfig) -> Tensor:
-    """The training loss of logits (B, T, N) against targets (B, T, N), a scalar."""
+def loss_of(logits: Logits, target: Tensor, config: TrainConfig) -> Tensor:
+    """The training loss of logits against targets (B, T, N), a scalar.
+
+    Where the network says how many steps there are, that is learned by cross-entropy beside the order, which is
+    learned on the steps taken; where stopping is an action, it is the right one at every step not taken.
+    """
+    if logits.stop is not None:
+        joint = torch.cat([logits.order, logits.stop[..., None]], dim=-1)
+        stopped = torch.cat([target, (target.sum(dim=-1, keepdim=True) == 0).to(target.dtype)], dim=-1)
+        classes = (*config.classes, max(config.classes) + 1) if config.classes else ()
+        return cross_entropy(torch.log_softmax(joint, dim=-1), stopped, classes)
+    loss = _order_loss(logits.order, target, config)
+    if logits.length is not None:
+        steps = (target.sum(dim=-1) > 0).sum(dim=-1)
+        loss = loss + functional.cross_entropy(logits.length, steps)
+    return loss
+
+
+def _order_loss(order: Tensor, target: Tensor, config: TrainConfig) -> Tensor:
     if config.loss == "gumbel-sinkhorn":
         samples = gumbel_sinkhorn(
-            logits,
+            order,
             samples=config.samples,
             temperature=config.temperature,
             noise=config.noise,
@@ -73,7 +91,7 @@ def loss_of(logits: Tensor, target: Tensor, config: TrainConfig) -> Tensor:
         )
         return squared_error(samples, target)
     if config.loss == "sinkhorn":
-        log_prob = log_sinkhorn(logits / config.temperature, tolerance=None, max_iterations=config.iterations)
+        log_prob = log_sinkhorn(order / config.temperature, tolerance=None, max_iterations=config.iterations)
     else:
-        log_prob = torch.log_softmax(logits, dim=-1)
+        log_prob = torch.log_softmax(order, dim=-1)
     return cross_entropy(log_prob, target, config.classes)

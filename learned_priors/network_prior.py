@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self, overload
@@ -14,8 +14,9 @@ from numpy.typing import ArrayLike, NDArray
 from learned_priors import bundled
 from learned_priors.checkpoints import load_network, save_network
 from learned_priors.learner import CHUNK
-from learned_priors.networks import NetworkConfig, OrderNetwork
-from learned_priors.recipes import Recipe, TrainConfig, recipe_named
+from learned_priors.metrics import decoded
+from learned_priors.networks import Logits, NetworkConfig, OrderNetwork
+from learned_priors.recipes import RECIPES, Recipe, TrainConfig, recipe_named
 from learned_priors.training import FitProgress, fit
 from neurosym.demonstrations import Demonstrations
 from neurosym.errors import CheckpointError, InputError
@@ -45,7 +46,7 @@ class NetworkPrior(Prior):
         weights: a ``.safetensors`` file written by `save`. None takes weights that come with the package, chosen by
             the problem's domain when they are first needed.
         domain: whose bundled weights to take; None asks each problem.
-        encoder: what `fit` builds (``"small"``, ``"paper"``, or one registered); None is the small one.
+        encoder: what `fit` builds (``"small"``, ``"paper"``, ``"resnet18"``, or one registered); None is the small one.
         device: ``"cpu"`` or ``"cuda"``; reading and training happen there.
 
     Raises:
@@ -93,6 +94,34 @@ class NetworkPrior(Prior):
         weights = self._weights_for_pictures(batch.shape[1:])
         found = self._read(weights, batch)
         return found[0] if single else found
+
+    def predict(self, pictures: ArrayLike) -> NDArray[np.int64]:
+        """The model's own order, as the paper compares it; unlike one of `OrderScores`, it may be wrong by itself.
+
+        Plain ``bc`` and ``tcn-paper`` take the likeliest action of each step, so the same one may come twice. All
+        others take the likeliest number of steps, if that is unsure, and the best assignment of actions to them;
+        the full recipes sum the probabilities of interchangeable actions first.
+
+        Args:
+            pictures: uint8 (V, H, W, 3) of one piece of work, or a batch (M, V, H, W, 3).
+
+        Returns:
+            int64 (M, T) for a batch, (T,) for one: indices into the actions of the training; -1 after the last step.
+        """
+        batch, single = as_picture_batch(pictures)
+        weights = self._weights_for_pictures(batch.shape[1:])
+        config = weights.network.config
+        classes = _classes_of(weights) if self.recipe.train.sum_classes else ()
+        found = [np.empty((0, config.n_steps), dtype=np.int64)]
+        for logits in self._logits(weights, batch):
+            if self.recipe.predicts == "independent":
+                found.append(_likeliest_by_step(logits))
+                continue
+            length = weights.network.log_length(logits)
+            table = weights.network.log_prob(logits).cpu().numpy()
+            found.append(decoded(table, classes, log_length=None if length is None else length.cpu().numpy()))
+        orders = np.concatenate(found)
+        return orders[0] if single else orders
 
     def scores(self, problems: Sequence[Problem]) -> list[OrderScores]:
         """One `OrderScores` a problem, columns in the order of its actions; problems are read in batches.
@@ -161,6 +190,7 @@ class NetworkPrior(Prior):
             n_actions=len(demonstrations.actions),
             width=self.recipe.width,
             temperature=train.temperature,
+            stop=self.recipe.stop if demonstrations.lengths.min() < demonstrations.sequences.shape[1] else "none",
         )
         fitted = fit(
             demonstrations,
@@ -172,12 +202,14 @@ class NetworkPrior(Prior):
             checkpoint=Path(checkpoint) if checkpoint else None,
             resume=resume,
         )
-        header = {
+        header: dict[str, Any] = {
             "prior": self.recipe.name,
             "domain": demonstrations.domain,
             "actions": list(demonstrations.actions),
             "training": fitted.figures,
         }
+        if demonstrations.classes:
+            header["classes"] = list(demonstrations.classes)
         self._own = _Weights(fitted.network, header)
         return self
 
@@ -193,21 +225,31 @@ class NetworkPrior(Prior):
         save_network(Path(path), self._own.network, header)
         return Path(path)
 
-    @torch.inference_mode()
     def _read(self, weights: _Weights, batch: NDArray[np.uint8]) -> list[OrderScores]:
-        network, actions = weights.network, tuple(weights.header["actions"])
+        network, actions, classes = weights.network, tuple(weights.header["actions"]), _classes_of(weights)
+        found: list[OrderScores] = []
+        for logits in self._logits(weights, batch):
+            tables = network.log_prob(logits).cpu().numpy()
+            length = network.log_length(logits)
+            lengths = [None] * len(tables) if length is None else length.cpu().numpy()
+            found += [OrderScores(table, actions, n, classes) for table, n in zip(tables, lengths)]
+        return found
+
+    def _logits(self, weights: _Weights, batch: NDArray[np.uint8]) -> Iterator[Logits]:
+        """What the network says of the pictures, chunk by chunk."""
         if len(batch):
             _checked_pictures(batch[0], weights)
-        found: list[OrderScores] = []
         for start in range(0, len(batch), CHUNK):
-            pictures = torch.from_numpy(np.ascontiguousarray(batch[start : start + CHUNK])).to(self.device)
-            tables = network.log_prob(network(network.prepare(pictures))).cpu().numpy()
-            found += [OrderScores(table, actions) for table in tables]
-        return found
+            with torch.inference_mode():
+                pictures = torch.from_numpy(np.ascontiguousarray(batch[start : start + CHUNK])).to(self.device)
+                logits: Logits = weights.network(weights.network.prepare(pictures))
+            yield logits
 
     def _loaded(self, path: Path) -> _Weights:
         network, header = load_network(path)
-        if header.get("prior") != self.recipe.name:
+        trained = RECIPES.get(str(header.get("prior")))
+        shared = trained is not None and trained.trained_as == self.recipe.trained_as
+        if header.get("prior") != self.recipe.name and not shared:
             raise CheckpointError(
                 f"Expected weights of the prior {self.recipe.name!r} in {path}; got those of {header.get('prior')!r}. "
                 f"Load them by the file's name: load_prior({str(path)!r})."
@@ -217,25 +259,44 @@ class NetworkPrior(Prior):
                 f"Expected weights of the encoder {self.encoder!r} in {path}; got {network.config.encoder!r}. "
                 "Leave encoder=None to take what the file has."
             )
-        return _Weights(network.to(self.device), header, path)
+        # What is saved from here is to be read as this prior reads it.
+        return _Weights(network.to(self.device), {**header, "prior": self.recipe.name}, path)
 
     def _weights_for_problem(self, problem: Problem) -> _Weights:
         family, actions = problem.family, tuple(problem.actions)
-        return self._weights((family, actions), lambda: bundled.for_actions(self.recipe.name, family, actions))
+        return self._weights((family, actions), lambda: bundled.for_actions(self.recipe.trained_as, family, actions))
 
     def _weights_for_pictures(self, shape: tuple[int, ...]) -> _Weights:
-        return self._weights(shape, lambda: bundled.for_pictures(self.recipe.name, shape))
+        return self._weights(shape, lambda: bundled.for_pictures(self.recipe.trained_as, shape))
 
     def _weights(self, question: Hashable, choose: Callable[[], Path]) -> _Weights:
         """Our own weights, or bundled ones; which file answers a question is looked up once, and loaded once."""
         if self._own:
             return self._own
         if question not in self._choices:
-            name = self.recipe.name
+            name = self.recipe.trained_as
             path = bundled.for_domain(name, self.domain) if self.domain is not None else choose()
             known = [w for w in self._choices.values() if w.path == path]
             self._choices[question] = known[0] if known else self._loaded(path)
         return self._choices[question]
+
+
+def _classes_of(weights: _Weights) -> tuple[int, ...]:
+    return tuple(weights.header.get("classes", ()))
+
+
+def _likeliest_by_step(logits: Logits) -> NDArray[np.int64]:
+    """Each step by itself: int64 (B, T), -1 from the first step on whose likeliest choice is to stop."""
+    steps, actions = logits.order.shape[1:]
+    if logits.length is not None:
+        ended = torch.arange(steps, device=logits.order.device) >= logits.length.argmax(dim=-1, keepdim=True)
+        choice = logits.order.argmax(dim=-1)
+    else:
+        stop = [] if logits.stop is None else [logits.stop[..., None]]
+        choice = torch.cat([logits.order, *stop], dim=-1).argmax(dim=-1)
+        ended = (choice == actions).cumsum(dim=-1) > 0
+    order: NDArray[np.int64] = choice.masked_fill(ended, -1).cpu().numpy()
+    return order
 
 
 def _checked_device(name: str) -> torch.device:

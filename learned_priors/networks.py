@@ -1,21 +1,24 @@
-"""The networks that order actions: an encoder of pictures and a head that gives logits for each step and action."""
+"""The networks that order actions: an encoder of pictures, a head that gives logits for each step and action, and,
+where tasks differ in length, something that tells how many steps there are."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any, Literal, get_args
+from typing import Any, Literal, NamedTuple, get_args
 
 import torch
 from torch import Tensor, nn
 
 from learned_priors.encoders import PictureShape, build_encoder
 from learned_priors.sinkhorn import TOLERANCE, log_sinkhorn
+from learned_priors.stopping import StoppingNetwork, log_length_of_stops
 from learned_priors.tcn import TemporalDecoder
 from neurosym.errors import CheckpointError
 
 Head = Literal["dense", "tcn"]
 Decoding = Literal["sinkhorn", "rows"]
+Stop = Literal["none", "head", "network", "class"]
 
 #: Column updates when reading: after so many, columns of near ties are off by about 1e-3 (see `MAX_ITERATIONS`).
 READ_ITERATIONS = 1_000
@@ -33,6 +36,9 @@ class NetworkConfig:
         n_steps, n_actions: T and N; T < N makes a rectangular head.
         width: neurons in the dense head's hidden layer, or latent dimensions a step of the temporal one.
         temperature: of the Sinkhorn operator.
+        stop: what tells how many of the T steps a task takes. "none": all of them; "head": a layer on the features of
+            the one encoder; "network": a network of its own, with an encoder of its own (the paper's, Sec. IV-B);
+            "class": one more action, to stop, at every step (the paper's extension of its temporal network).
     """
 
     encoder: str
@@ -43,6 +49,7 @@ class NetworkConfig:
     n_actions: int
     width: int
     temperature: float = 1.0
+    stop: Stop = "none"
 
     def to_json(self) -> dict[str, Any]:
         return {**asdict(self), "picture_shape": list(self.picture_shape)}
@@ -57,6 +64,8 @@ class NetworkConfig:
                 raise ValueError(f"sizes are to be positive integers: {sizes}")
             if config.head not in get_args(Head) or config.decoding not in get_args(Decoding):
                 raise ValueError(f"unknown head {config.head!r} or decoding {config.decoding!r}")
+            if config.stop not in get_args(Stop) or (config.stop == "class" and config.decoding != "rows"):
+                raise ValueError(f"unknown stop {config.stop!r}, or a stop class that is not decoded by rows")
             if config.n_steps > config.n_actions or not config.temperature > 0:
                 raise ValueError("more steps than actions, or a temperature that is not positive")
         except (TypeError, KeyError, ValueError) as error:
@@ -66,40 +75,85 @@ class NetworkConfig:
         return config
 
 
+class Logits(NamedTuple):
+    """What a network says of B pictures.
+
+    Attributes:
+        order: (B, T, N), X = g_theta(I): how well action j suits step i.
+        length: (B, T + 1), how likely 0 .. T steps are; None unless a stopping head or network says so.
+        stop: (B, T), how well stopping suits step i, on the scale of `order`; None unless stopping is an action.
+    """
+
+    order: Tensor
+    length: Tensor | None = None
+    stop: Tensor | None = None
+
+    def to(self, dtype: torch.dtype) -> Logits:
+        """The same in another precision."""
+        return Logits(self.order.to(dtype), *(None if part is None else part.to(dtype) for part in self[1:]))
+
+    @staticmethod
+    def joined(parts: Sequence[Logits]) -> Logits:
+        """One after the other, along the first axis."""
+        order, *others = (None if column[0] is None else torch.cat(column) for column in zip(*parts))
+        assert order is not None
+        return Logits(order, *others)
+
+
 class OrderNetwork(nn.Module):
-    """Pictures -> logits X (B, T, N): how well action j suits step i (Burke et al. 2021, X = g_theta(I))."""
+    """Pictures -> `Logits` (Burke et al. 2021, X = g_theta(I), and f_phi(I) for the number of steps)."""
 
     def __init__(self, config: NetworkConfig) -> None:
         super().__init__()
         self.config = config
         self.encoder = build_encoder(config.encoder, config.picture_shape)
         features, steps, actions = self.encoder.out_features, config.n_steps, config.n_actions
+        columns = actions + (config.stop == "class")
         self.head: nn.Module
         if config.head == "tcn":
-            self.head = TemporalDecoder(features, steps, actions, width=config.width)
+            self.head = TemporalDecoder(features, steps, columns, width=config.width)
         else:
             self.head = nn.Sequential(
                 nn.Linear(features, config.width),
                 nn.ReLU(),
-                nn.Linear(config.width, steps * actions),
-                nn.Unflatten(1, (steps, actions)),
+                nn.Linear(config.width, steps * columns),
+                nn.Unflatten(1, (steps, columns)),
             )
+        if config.stop == "head":
+            self.length = nn.Linear(features, steps + 1)
+        elif config.stop == "network":
+            self.stopping = StoppingNetwork(build_encoder(config.encoder, config.picture_shape), steps)
 
     def prepare(self, pictures: Tensor) -> Tensor:
         """uint8 (B, V, H, W, 3) -> what `forward` takes; done once for pictures that are seen many times."""
         return self.encoder.prepare(pictures)
 
-    def forward(self, prepared: Tensor) -> Tensor:
-        """What `prepare` gave -> logits, float (B, T, N)."""
-        logits: Tensor = self.head(self.encoder(prepared))
-        return logits
+    def forward(self, prepared: Tensor) -> Logits:
+        """What `prepare` gave -> logits."""
+        features = self.encoder(prepared)
+        table = self.head(features)
+        if self.config.stop == "class":
+            return Logits(table[..., :-1], stop=table[..., -1])
+        if self.config.stop == "head":
+            return Logits(table, self.length(features))
+        if self.config.stop == "network":
+            return Logits(table, self.stopping(prepared))
+        return Logits(table)
 
-    def log_prob(self, logits: Tensor) -> Tensor:
-        """Logits -> log-probabilities (B, T, N), float64; rows of exp() sum to one, columns to at most one (Sinkhorn).
+    def log_prob(self, logits: Logits) -> Tensor:
+        """Log-probabilities of actions (B, T, N), float64, given that the step is taken.
 
-        In float64, where sums are exact enough that a picture read alone or in a batch stops at the same iteration.
+        Rows of exp() sum to one, columns to at most one (Sinkhorn). In float64, where sums are exact enough that a
+        picture read alone or in a batch stops at the same iteration.
         """
-        exact = logits.to(torch.float64)
+        exact = logits.order.to(torch.float64)
         if self.config.decoding == "rows":
             return torch.log_softmax(exact, dim=-1)
         return log_sinkhorn(exact / self.config.temperature, tolerance=TOLERANCE, max_iterations=READ_ITERATIONS)
+
+    def log_length(self, logits: Logits) -> Tensor | None:
+        """Log-probabilities that the task takes 0 .. T steps, (B, T + 1), float64; None where it always takes T."""
+        exact = logits.to(torch.float64)
+        if exact.stop is not None:
+            return log_length_of_stops(exact.order, exact.stop)
+        return None if exact.length is None else torch.log_softmax(exact.length, dim=-1)

@@ -1,4 +1,4 @@
-"""A temporal convolutional decoder, and the two priors that use it.
+"""A temporal convolutional decoder, and the three priors that use it.
 
 Burke et al. (RA-L 2021, Fig. 2 and appendix) decode with a temporal convolutional network (Bai, Kolter, Koltun,
 arXiv:1803.01271) of as many layers as there are steps. It models what follows what, but unlike a permutation it
@@ -79,11 +79,25 @@ def tcn_paper(
     encoder: str | None = None,
     device: str = "cpu",
 ) -> NetworkPrior:
-    """The paper's recipe: one demonstration a picture, cross-entropy by step.
+    """The paper's BC+TCN: one demonstration a picture, cross-entropy by step; `predict` may use an action twice.
 
     Arguments as for `learned_priors.sinkhorn.sinkhorn`.
     """
     return _prior("tcn-paper", weights, domain, encoder, device)
+
+
+def tcn_paper_hungarian(
+    *,
+    weights: str | Path | None = None,
+    domain: str | None = None,
+    encoder: str | None = None,
+    device: str = "cpu",
+) -> NetworkPrior:
+    """The paper's BC+TCN+Hungarian: the same network, `predict` assigns each action at most once.
+
+    Arguments as for `learned_priors.sinkhorn.sinkhorn`; it also reads weights that were trained as `tcn-paper`.
+    """
+    return _prior("tcn-paper+hungarian", weights, domain, encoder, device)
 
 
 def _prior(

@@ -11,7 +11,7 @@ import math
 import time
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -73,8 +73,11 @@ def fit(
     Returns:
         The network, its weights rounded to float16 values, and figures.
     """
+    if config.sum_classes and not config.classes:
+        config = replace(config, classes=demonstrations.classes)
     soft = demonstrations.marginals if config.soft else None
-    if config.soft and soft is None:
+    # Where actions are interchangeable, summing them stands in for the other orders.
+    if config.soft and soft is None and not config.classes:
         warnings.warn(
             "These demonstrations have no marginals (shares of valid orders): learning from the sequences alone.",
             UserWarning,
@@ -176,4 +179,5 @@ def _round_to_half(network: OrderNetwork) -> None:
     """Files hold float16; rounding here makes the network in memory and the one read back the same."""
     with torch.no_grad():
         for tensor in network.state_dict().values():
-            tensor.copy_(tensor.to(torch.float16).to(tensor.dtype))
+            if tensor.is_floating_point():
+                tensor.copy_(tensor.to(torch.float16).to(tensor.dtype))

@@ -31,6 +31,8 @@ class Demonstrations:
         groups: int64 (M,): demonstrations of one group show one problem (turned, lit anew) and are held out
             together; default: each its own.
         domain: the family's name, or "".
+        classes: one integer an action, or empty; actions of one class are interchangeable: swapping two of them
+            leaves the whole problem as it was. Empty: each is its own.
     """
 
     pictures: NDArray[np.uint8]
@@ -39,6 +41,7 @@ class Demonstrations:
     marginals: NDArray[np.float32] | None = None
     groups: NDArray[np.int64] | None = None
     domain: str = ""
+    classes: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         pictures = np.asarray(self.pictures)
@@ -60,6 +63,10 @@ class Demonstrations:
         if groups.shape != (m,) or not np.issubdtype(groups.dtype, np.integer):
             raise DemonstrationError(f"Expected groups as integers ({m},); got {groups.dtype} {groups.shape}.")
         object.__setattr__(self, "groups", groups.astype(np.int64))
+        classes = np.asarray(self.classes, dtype=np.int64 if len(self.classes) == 0 else None)
+        if classes.shape not in ((0,), (n,)) or not np.issubdtype(classes.dtype, np.integer):
+            raise DemonstrationError(f"Expected {n} classes, an integer an action, or none; got {self.classes}.")
+        object.__setattr__(self, "classes", tuple(int(c) for c in classes))
 
     def __len__(self) -> int:
         return len(self.pictures)
@@ -76,7 +83,7 @@ class Demonstrations:
         marginals = None if self.marginals is None else self.marginals[i]
         assert self.groups is not None
         return Demonstrations(
-            self.pictures[i], self.sequences[i], self.actions, marginals, self.groups[i], self.domain
+            self.pictures[i], self.sequences[i], self.actions, marginals, self.groups[i], self.domain, self.classes
         )
 
     def save(self, path: str | Path) -> Path:
@@ -92,6 +99,8 @@ class Demonstrations:
             "groups": np.asarray(self.groups),
             "domain": np.array(self.domain, dtype=np.str_),
         }
+        if self.classes:
+            arrays["classes"] = np.array(self.classes, dtype=np.int64)
         if self.marginals is not None:
             arrays["marginals"] = self.marginals
         with replacing(path) as temporary:
@@ -120,6 +129,7 @@ class Demonstrations:
             data.get("marginals"),
             data.get("groups"),
             str(data.get("domain", "")),
+            tuple(data.get("classes", ())),
         )
 
 

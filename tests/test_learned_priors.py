@@ -392,7 +392,7 @@ def test_the_temporal_decoder_has_a_layer_a_step_and_looks_back_only() -> None:
 def test_a_network_config_survives_json() -> None:
     config = NetworkConfig("small", "tcn", "rows", (2, 8, 8, 3), 3, 4, 16)
     assert NetworkConfig.from_json(json.loads(json.dumps(config.to_json()))) == config
-    assert OrderNetwork(config)(torch.zeros(5, 2, 768)).shape == (5, 3, 4)
+    assert OrderNetwork(config)(torch.zeros(5, 2, 768)).order.shape == (5, 3, 4)
 
 
 def test_importing_the_package_does_not_import_torch() -> None:

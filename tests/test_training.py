@@ -18,6 +18,7 @@ import torch
 from learned_priors.losses import cross_entropy, loss_of, squared_error, summed_by_class, targets_of
 from learned_priors.metrics import per_step_accuracy, whole_order_accuracy
 from learned_priors.network_prior import NetworkPrior
+from learned_priors.networks import Logits
 from learned_priors.recipes import RECIPES
 from learned_priors.sinkhorn import log_sinkhorn
 from learned_priors.training import FitProgress
@@ -195,7 +196,7 @@ def test_variable_lengths_mask_the_steps_not_taken() -> None:
     moved = logits.clone()
     moved[0, 2] += torch.tensor([5.0, 0.0, 0.0, 0.0])
     config = replace(TINY, loss="rows")
-    assert loss_of(logits, target, config) == loss_of(moved, target, config)
+    assert loss_of(Logits(logits), target, config) == loss_of(Logits(moved), target, config)
     samples = torch.log_softmax(torch.stack([logits, moved]), -1)
     assert squared_error(samples[:1], target) == squared_error(samples[1:], target)
 
