@@ -19,9 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from neurosym.errors import InputError
-from neurosym.simulation.looks import VIEWS, Style, style_named
-from neurosym.simulation.render import CHUNK, Job, Progress, render_chunks
-from neurosym.simulation.scene import RGB, Scene, scene_of
+from neurosym.simulation.looks import VIEWS, Camera, Style, style_named
+from neurosym.simulation.render import CHUNK, Job, Progress, render_chunks, scenes_of
+from neurosym.simulation.scene import RGB, Scene
 
 #: Raise it whenever the same request would give other pixels.
 RENDER_VERSION = 1
@@ -46,6 +46,7 @@ def cached_pictures(
     workers: int = 1,
     progress: Progress | None = None,
     folder: str | Path | None = None,
+    cameras: Sequence[Camera] = VIEWS,
 ) -> NDArray[np.uint8]:
     """Pictures of many assemblies, as `render_many` makes them, from disk where they were made before.
 
@@ -53,26 +54,27 @@ def cached_pictures(
     orientations, say), and is found again only if they do. A folder that cannot be written to costs speed, no more.
 
     Args:
-        jobs: pairs of an assembly and its seed.
+        jobs: pairs of an assembly (or a scene, whose colours are its own) and its seed.
         style: as in `PictureStudio.views`.
         colours: part name -> RGB in 0..1, for all.
         size: height and width in pixels.
         workers: processes that draw what is missing.
         progress: called with (done, total).
         folder: where the files are; None means `cache_folder`.
+        cameras: where from.
 
     Returns:
-        uint8 (len(jobs), 4, size, size, 3).
+        uint8 (len(jobs), n_cameras, size, size, 3).
     """
     look = style_named(style)
     if size < 1:
         raise InputError(f"Expected pictures of at least one pixel; got size={size}.")
     where = (cache_folder() if folder is None else Path(folder)) / "pictures"
-    scenes = [(scene_of(assembly, colours), int(seed)) for assembly, seed in jobs]
+    scenes = scenes_of(jobs, colours)
     starts = range(0, len(scenes), CHUNK)
     chunks = [scenes[i : i + CHUNK] for i in starts]
-    paths = [where / f"{_key(chunk, look, size)}.z" for chunk in chunks]
-    pictures = np.empty((len(scenes), len(VIEWS), size, size, 3), dtype=np.uint8)
+    paths = [where / f"{_key(chunk, look, size, cameras)}.z" for chunk in chunks]
+    pictures = np.empty((len(scenes), len(cameras), size, size, 3), dtype=np.uint8)
     missing, done = [], 0
     for number, (start, chunk) in enumerate(zip(starts, chunks)):
         place = pictures[start : start + len(chunk)]
@@ -82,7 +84,7 @@ def cached_pictures(
                 progress(done, len(scenes))
         else:
             missing.append(number)
-    made = render_chunks([chunks[number] for number in missing], look, size, workers)
+    made = render_chunks([chunks[number] for number in missing], look, size, workers, cameras)
     for number, drawn in zip(missing, made):
         pictures[starts[number] : starts[number] + len(drawn)] = drawn
         _save(paths[number], drawn)
@@ -92,10 +94,10 @@ def cached_pictures(
     return pictures
 
 
-def _key(chunk: Sequence[tuple[Scene, int]], style: Style, size: int) -> str:
+def _key(chunk: Sequence[tuple[Scene, int]], style: Style, size: int, cameras: Sequence[Camera]) -> str:
     # A style that does not vary draws the same for every seed.
     seeds = [seed if style.is_random else 0 for _, seed in chunk]
-    found = hashlib.sha256(repr((RENDER_VERSION, style, VIEWS, size, seeds)).encode())
+    found = hashlib.sha256(repr((RENDER_VERSION, style, tuple(cameras), size, seeds)).encode())
     for scene, _ in chunk:
         found.update(scene.digest)
     return found.hexdigest()

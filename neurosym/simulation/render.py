@@ -21,8 +21,8 @@ from neurosym.simulation.scene import RGB, Scene, scene_of
 
 #: Called with (done, total) while many pictures are made.
 Progress = Callable[[int, int], None]
-#: An assembly and the seed of its picture.
-Job = tuple[Assembly, int]
+#: An assembly, or the scene made of it, and the seed of its picture.
+Job = tuple[Assembly | Scene, int]
 #: Pictures that one process makes before it hands them back (about a quarter of a second's work).
 CHUNK = 48
 
@@ -173,25 +173,27 @@ def render_many(
     size: int = 64,
     workers: int = 1,
     progress: Progress | None = None,
+    cameras: Sequence[Camera] = VIEWS,
 ) -> NDArray[np.uint8]:
     """Pictures of many assemblies, in order, the same for any number of workers.
 
     Args:
-        jobs: pairs of an assembly and its seed.
+        jobs: pairs of an assembly (or a scene, whose colours are its own) and its seed.
         style: as in `PictureStudio.views`.
         colours: part name -> RGB in 0..1, for all.
         size: height and width in pixels.
         workers: processes; 1 stays in this one.
         progress: called with (done, total).
+        cameras: where from.
 
     Returns:
-        uint8 (len(jobs), 4, size, size, 3).
+        uint8 (len(jobs), n_cameras, size, size, 3).
     """
-    scenes = [(scene_of(assembly, colours), int(seed)) for assembly, seed in jobs]
-    pictures = np.empty((len(jobs), len(VIEWS), size, size, 3), dtype=np.uint8)
+    scenes = scenes_of(jobs, colours)
+    pictures = np.empty((len(jobs), len(cameras), size, size, 3), dtype=np.uint8)
     chunks = [scenes[i : i + CHUNK] for i in range(0, len(scenes), CHUNK)]
     done = 0
-    for part in render_chunks(chunks, style_named(style), size, workers):
+    for part in render_chunks(chunks, style_named(style), size, workers, cameras):
         pictures[done : done + len(part)] = part
         done += len(part)
         if progress is not None:
@@ -199,28 +201,50 @@ def render_many(
     return pictures
 
 
-def render_chunks(chunks: Sequence[Sequence[tuple[Scene, int]]], style: Style, size: int, workers: int) -> Any:
-    """An iterator over the pictures of each chunk, uint8 (n, 4, size, size, 3), in order."""
+def scenes_of(jobs: Sequence[Job], colours: Mapping[str, RGB] | None) -> list[tuple[Scene, int]]:
+    """The scenes of jobs, with their seeds."""
+    return [
+        (given if isinstance(given, Scene) else scene_of(given, colours), int(seed)) for given, seed in jobs
+    ]
+
+
+def render_chunks(
+    chunks: Sequence[Sequence[tuple[Scene, int]]],
+    style: Style,
+    size: int,
+    workers: int,
+    cameras: Sequence[Camera] = VIEWS,
+) -> Any:
+    """An iterator over the pictures of each chunk, uint8 (n, n_cameras, size, size, 3), in order."""
     if workers == 1 or len(chunks) < 2:
-        return _in_this_process(chunks, style, size)
+        return _in_this_process(chunks, style, size, cameras)
     from joblib import Parallel, delayed
 
     pool = Parallel(n_jobs=workers, return_as="generator")
-    return pool(delayed(_render_chunk)(chunk, style, size) for chunk in chunks)
+    return pool(delayed(_render_chunk)(chunk, style, size, cameras) for chunk in chunks)
 
 
-def _in_this_process(chunks: Sequence[Sequence[tuple[Scene, int]]], style: Style, size: int) -> Any:
+def _in_this_process(
+    chunks: Sequence[Sequence[tuple[Scene, int]]], style: Style, size: int, cameras: Sequence[Camera]
+) -> Any:
     with PictureStudio() as studio:
         for chunk in chunks:
-            yield _draw(studio, chunk, style, size)
+            yield _draw(studio, chunk, style, size, cameras)
 
 
-def _render_chunk(chunk: Sequence[tuple[Scene, int]], style: Style, size: int) -> NDArray[np.uint8]:
+def _render_chunk(
+    chunk: Sequence[tuple[Scene, int]], style: Style, size: int, cameras: Sequence[Camera]
+) -> NDArray[np.uint8]:
     with PictureStudio() as studio:
-        return _draw(studio, chunk, style, size)
+        return _draw(studio, chunk, style, size, cameras)
 
 
-def _draw(studio: PictureStudio, chunk: Sequence[tuple[Scene, int]], style: Style, size: int) -> NDArray[np.uint8]:
+def _draw(
+    studio: PictureStudio, chunk: Sequence[tuple[Scene, int]], style: Style, size: int, cameras: Sequence[Camera]
+) -> NDArray[np.uint8]:
     return np.stack(
-        [studio.views(scene, style=style, size=size, rng=np.random.default_rng(seed)) for scene, seed in chunk]
+        [
+            studio.views(scene, style=style, size=size, rng=np.random.default_rng(seed), cameras=cameras)
+            for scene, seed in chunk
+        ]
     )

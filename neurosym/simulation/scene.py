@@ -32,7 +32,7 @@ PALETTE: tuple[RGB, ...] = (
 
 @dataclass(frozen=True)
 class Scene:
-    """An assembly as arrays, in the cameras' frame: middle at the origin, largest extent from -1 to 1.
+    """An assembly as arrays, in the cameras' frame: middle at the origin, largest extent from -1 to 1 (see `scene_of`).
 
     Boxes are given face by face, and faces that lie against another's are left out: what is hidden costs the renderer
     as much as what is seen. An item is one rectangle or one mesh.
@@ -73,12 +73,17 @@ class Scene:
         return found.digest()
 
 
-def scene_of(assembly: Assembly, colours: Mapping[str, RGB] | None = None) -> Scene:
+def scene_of(
+    assembly: Assembly, colours: Mapping[str, RGB] | None = None, *, frame: Array | None = None
+) -> Scene:
     """An assembly as the cameras see it.
 
     Args:
         assembly: the parts, in the world.
         colours: part name -> RGB in 0..1; parts without one take the palette's, by their place in the assembly.
+        frame: float64 (2, 3), the least and the greatest corner of a box in the world: its middle comes to the origin,
+            its largest extent to -1 .. 1. None takes the assembly's own bounds; give one where pictures of different
+            assemblies are to show where things stand, and how large they are.
 
     Raises:
         InputError: a colour that is not three numbers in 0..1.
@@ -88,7 +93,7 @@ def scene_of(assembly: Assembly, colours: Mapping[str, RGB] | None = None) -> Sc
     if unknown := set(given) - set(assembly.names):
         raise UnknownNameError("part", min(unknown), assembly.names)
     chosen = [_checked(name, given.get(name, palette_colour(i))) for i, name in enumerate(assembly.names)]
-    bounds = _bounds(assembly)
+    bounds = _bounds(assembly) if frame is None else np.asarray(frame, dtype=np.float64)
     middle, scale = bounds.mean(axis=0), 2 / float(np.ptp(bounds, axis=0).max())
     poses = assembly.X_WB.copy()
     poses[:, :3, 3] = (poses[:, :3, 3] - middle) * scale

@@ -1,0 +1,157 @@
+"""Blocks, and the reference towers made of them: the world that the tower domain's predicates are asked about."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property, lru_cache
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from neurosym.errors import AssemblyError, UnknownNameError
+from neurosym.geometry.assembly import Assembly, boxes_part
+
+Array = NDArray[np.float64]
+#: What makes blocks interchangeable: a colour and a size (width along x, depth along y, height).
+Kind = tuple[str, tuple[float, float, float]]
+
+#: Colours of blocks, RGB in 0..1. Their hues lie far enough apart to stay themselves in the hard pictures.
+COLOURS: Mapping[str, tuple[float, float, float]] = {
+    "red": (0.82, 0.12, 0.10),
+    "yellow": (0.93, 0.80, 0.12),
+    "blue": (0.12, 0.28, 0.82),
+    "green": (0.16, 0.66, 0.22),
+    "cyan": (0.15, 0.75, 0.80),
+    "purple": (0.62, 0.18, 0.76),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """A block: a box that can be placed once.
+
+    Attributes:
+        name: of the block, and of the action primitive that places it.
+        colour: one of `COLOURS`.
+        size: width (x), depth (y) and height (z), in any unit of length.
+
+    Raises:
+        UnknownNameError: no such colour.
+        AssemblyError: a size that is not three lengths above 0.
+    """
+
+    name: str
+    colour: str
+    size: tuple[float, float, float] = (1.0, 1.0, 1.0)
+
+    def __post_init__(self) -> None:
+        if self.colour not in COLOURS:
+            raise UnknownNameError("colour", self.colour, COLOURS)
+        size = np.asarray(self.size, dtype=np.float64)
+        if size.shape != (3,) or not np.isfinite(size).all() or size.min() <= 0:
+            raise AssemblyError(f"Block {self.name!r}: expected a size of three lengths above 0; got {self.size!r}.")
+        object.__setattr__(self, "size", tuple(size.tolist()))
+
+    @property
+    def kind(self) -> Kind:
+        """What the reference asks of a block: colour and size."""
+        return self.colour, self.size
+
+
+@dataclass(frozen=True, eq=False)
+class ReferenceTower:
+    """A tower to be built, and the blocks at hand.
+
+    Attributes:
+        blocks: all blocks, those that the tower does not need among them.
+        levels: names of the blocks that the reference is made of, from the bottom up.
+        offsets: float64 (n_levels, 2): how far each level's middle lies from the plumb line, along x and y.
+        frame: height of the space that pictures show; None is the height of the tower.
+    """
+
+    blocks: tuple[Block, ...]
+    levels: tuple[str, ...]
+    offsets: Array
+    frame: float | None = None
+    _afresh: bool = field(default=False, repr=False)
+
+    @classmethod
+    def of(
+        cls,
+        blocks: Sequence[Block],
+        levels: Sequence[str],
+        offsets: ArrayLike | None = None,
+        frame: float | None = None,
+    ) -> ReferenceTower:
+        """A reference tower, checked; without offsets it stands plumb.
+
+        Raises:
+            AssemblyError: no levels, a name that two blocks bear or two levels take, offsets of another shape.
+            UnknownNameError: a level of no known block.
+        """
+        names = [b.name for b in blocks]
+        if twice := sorted({n for n in names if names.count(n) > 1}):
+            raise AssemblyError(f"Expected each block's name once; got twice: {', '.join(twice)}. Rename one.")
+        levels = tuple(levels)
+        if not levels:
+            raise AssemblyError("Expected a tower of at least one level; got none.")
+        for name in levels:
+            if name not in names:
+                raise UnknownNameError("block", name, names)
+        if twice := sorted({n for n in levels if levels.count(n) > 1}):
+            raise AssemblyError(f"Expected each block in one level of the tower; got twice: {', '.join(twice)}.")
+        moved = np.zeros((len(levels), 2)) if offsets is None else np.asarray(offsets, dtype=np.float64)
+        if moved.shape != (len(levels), 2) or not np.isfinite(moved).all():
+            raise AssemblyError(f"Expected finite offsets (x, y) of {len(levels)} levels; got shape {moved.shape}.")
+        return cls(tuple(blocks), levels, moved, frame)
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Names of all blocks."""
+        return tuple(b.name for b in self.blocks)
+
+    @cached_property
+    def kinds(self) -> dict[str, Kind]:
+        """Name of a block -> its kind."""
+        return {b.name: b.kind for b in self.blocks}
+
+    @cached_property
+    def reference(self) -> tuple[Kind, ...]:
+        """What kind of block each level asks for, from the bottom up."""
+        return tuple(self.kinds[name] for name in self.levels)
+
+    @cached_property
+    def colours(self) -> tuple[str, ...]:
+        """The colour sequence, from the bottom up."""
+        return tuple(colour for colour, _ in self.reference)
+
+    @cached_property
+    def assembly(self) -> Assembly:
+        """The finished tower on the table at z = 0, its parts called level 1, level 2, ... from the bottom up.
+
+        Towers of one shape share it, and with it what is known of their geometry.
+        """
+        sizes = tuple(size for _, size in self.reference)
+        offsets = tuple((float(x), float(y)) for x, y in self.offsets)
+        return _stack(sizes, offsets).afresh() if self._afresh else _stack(sizes, offsets)
+
+    def falling(self, height: int) -> tuple[int, ...]:
+        """Which levels (from 0) would fall when the lowest `height` stood by themselves; none: they stand."""
+        answer = self.assembly.stability().standing((1 << height) - 1)
+        return () if answer.stands else tuple(i for i in range(height) if answer.moving >> i & 1)
+
+    def afresh(self) -> ReferenceTower:
+        """The same tower with nothing remembered: every question is asked anew."""
+        return replace(self, _afresh=True)
+
+
+@lru_cache(maxsize=4096)
+def _stack(sizes: tuple[tuple[float, float, float], ...], offsets: tuple[tuple[float, float], ...]) -> Assembly:
+    parts, top = [], 0.0
+    for i, (size, (x, y)) in enumerate(zip(sizes, offsets), 1):
+        X = np.eye(4)
+        X[:3, 3] = x, y, top + size[2] / 2
+        parts.append(boxes_part(f"level {i}", np.zeros((1, 3)), np.array(size), X))
+        top += size[2]
+    return Assembly(tuple(parts), table=0.0)

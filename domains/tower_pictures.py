@@ -1,0 +1,146 @@
+"""Pictures of towers: one view from the side, raised a little, in an easy and in a hard setting.
+
+``easy``  plumb towers in the middle of the picture, one light, one camera, the blocks' own colours, no noise.
+``hard``  as untidy as a tower can be that stands for sure: it stands off the middle (by up to 0.6 of a block's edge
+          along either axis), leans (each level up to 0.05 farther out) and its blocks lie askew (each up to 0.12 off).
+          The light comes from anywhere above and may be dim or harsh, a picture in four has cast shadows, each
+          block's hue and brightness shift, the camera turns, rises and comes nearer, and there is pixel noise.
+
+What stands where is geometry: the offsets drawn here are those that stability is asked about. ``clean`` and
+``varied``, the names that other families use, stand for easy and hard.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from domains.tower_blocks import COLOURS, ReferenceTower
+from neurosym.errors import UnknownNameError
+from neurosym.family import Progress
+
+if TYPE_CHECKING:
+    from neurosym.simulation.looks import Camera, Style
+    from neurosym.simulation.scene import Scene
+
+#: Other families' names for the settings.
+ALIASES = {"clean": "easy", "varied": "hard"}
+#: Apart from the streams that pictures are drawn from.
+_OFFSET_STREAM = 0x0F_F5_E7
+
+
+@dataclass(frozen=True, slots=True)
+class Untidiness:
+    """How untidily towers are built, in shares of a block's edge: each is the most, drawn uniformly.
+
+    Attributes:
+        shift: of the whole tower, along x and along y, either way.
+        lean: of each level against the one below, in one direction, the same for the whole tower.
+        jitter: of each block by itself, in any direction.
+    """
+
+    shift: float = 0.0
+    lean: float = 0.0
+    jitter: float = 0.0
+
+
+#: The upper levels' centre of mass lies at most 3 leans and 2 jitters off the lowest block's middle: 0.39 of its edge.
+SETTINGS = {"easy": Untidiness(), "hard": Untidiness(shift=0.6, lean=0.05, jitter=0.12)}
+
+
+def setting_named(name: str) -> str:
+    """The setting that a name or an alias stands for.
+
+    Raises:
+        UnknownNameError: no such setting.
+    """
+    found = ALIASES.get(name, name)
+    if found not in SETTINGS:
+        raise UnknownNameError("style of pictures", name, (*SETTINGS, *ALIASES))
+    return found
+
+
+def picture_seed(seed: int, variant: str, number: int) -> int:
+    """The seed of one picture, and of the offsets behind it."""
+    return int(np.random.SeedSequence([seed, *variant.encode(), number]).generate_state(1)[0])
+
+
+def draw_offsets(setting: str, n_levels: int, seed: int) -> NDArray[np.float64]:
+    """Where a tower of cubes of edge one has its levels: float64 (n_levels, 2), off the plumb line along x and y."""
+    most = SETTINGS[setting_named(setting)]
+    rng = np.random.default_rng([_OFFSET_STREAM, seed])
+    shift, lean = rng.uniform(-most.shift, most.shift, 2), most.lean * _in_disc(rng, 1)
+    offsets: NDArray[np.float64] = shift + lean * np.arange(n_levels)[:, None] + most.jitter * _in_disc(rng, n_levels)
+    return offsets
+
+
+def _in_disc(rng: np.random.Generator, n: int) -> NDArray[np.float64]:
+    """Points drawn uniformly from the unit disc, float64 (n, 2)."""
+    radius, angle = np.sqrt(rng.random(n)), rng.uniform(0, 2 * np.pi, n)
+    return np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1)
+
+
+def take_pictures(
+    towers: Sequence[ReferenceTower],
+    seeds: Sequence[int],
+    *,
+    style: str,
+    workers: int = 1,
+    progress: Progress | None = None,
+) -> NDArray[np.uint8]:
+    """One picture a tower, uint8 (n, 1, 64, 64, 3), from disk where it was taken before."""
+    from neurosym.simulation.picture_cache import cached_pictures
+
+    jobs = [(_scene(tower), seed) for tower, seed in zip(towers, seeds, strict=True)]
+    return cached_pictures(jobs, style=look(style), workers=workers, progress=progress, cameras=cameras())
+
+
+def take_picture(tower: ReferenceTower, style: str, rng: np.random.Generator) -> NDArray[np.uint8]:
+    """The picture of one tower, uint8 (1, 64, 64, 3)."""
+    from neurosym.simulation.render import PictureStudio  # loads PyBullet
+
+    with PictureStudio() as studio:
+        return studio.views(_scene(tower), style=look(style), rng=rng, cameras=cameras())
+
+
+def cameras() -> tuple[Camera, ...]:
+    """The one camera: from the side (+x), raised a little."""
+    from neurosym.simulation.looks import Camera
+
+    return (Camera(0, 12, distance=6.6),)
+
+
+def look(style: str) -> Style:
+    """What chance may vary in a setting besides the tower itself."""
+    from neurosym.simulation.looks import Style
+
+    if setting_named(style) == "easy":
+        return Style()
+    return Style(
+        light_azimuth=(-90.0, 90.0),
+        light_elevation=(20.0, 80.0),
+        ambient=(0.35, 0.65),
+        diffuse=(0.25, 0.6),
+        specular=(0.0, 0.3),
+        shadow=0.25,
+        azimuth=8.0,
+        elevation=5.0,
+        distance=0.08,
+        hue=0.05,
+        brightness=0.3,
+        noise=(5.0, 25.0),
+    )
+
+
+def _scene(tower: ReferenceTower) -> Scene:
+    from neurosym.simulation.scene import scene_of
+
+    colours = {name: COLOURS[colour] for name, colour in zip(tower.assembly.names, tower.colours)}
+    height = tower.frame or float(tower.assembly.bounds[1, 2])
+    # The camera stays where it is: a low tower looks low.
+    half = height / 2
+    return scene_of(tower.assembly, colours, frame=np.array([[-half, -half, 0.0], [half, half, height]]))
