@@ -45,6 +45,7 @@ def demonstrate(
 
     jobs = [(word, picture_seed(seed, number)) for word, number in shown]
     groups: dict[str, int] = {}
+    letters = sorted({name[0] for name in names})
     return Demonstrations(
         pictures=cached_pictures(jobs, style=style, workers=workers, progress=progress),
         sequences=np.stack([_demonstrated(word, names, [seed, number]) for word, number in shown]),
@@ -52,6 +53,7 @@ def demonstrate(
         marginals=_shares([word for word, _ in shown], names) if recipe == "full" else None,
         groups=np.array([groups.setdefault(word, len(groups)) for word, _ in shown]),
         domain=domain,
+        classes=tuple(letters.index(name[0]) for name in names),
     )
 
 

@@ -57,6 +57,7 @@ def demonstrate(
     pictures = take_pictures(
         references, seeds, style=style, workers=workers or os.cpu_count() or 1, progress=progress
     )
+    kinds = list(dict.fromkeys((b.colour, b.size) for b in blocks))
     return Demonstrations(
         pictures=pictures,
         sequences=sequences,
@@ -64,6 +65,7 @@ def demonstrate(
         marginals=marginals if recipe == "full" else None,
         groups=np.array([sequence_numbers(variant)[number] for number in numbers]),
         domain=domain,
+        classes=tuple(kinds.index((b.colour, b.size)) for b in blocks),
     )
 
 

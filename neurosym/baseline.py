@@ -43,6 +43,8 @@ class _Search:
     def __init__(self, searches: Sequence[SearchProblem[Any]]) -> None:
         self.searches = searches
         self.answers: list[dict[tuple[Hashable, int], Any]] = [{} for _ in searches]
+        kinds = {tuple(s.classes) for s in searches}
+        self.classes = kinds.pop() if len(kinds) == 1 else tuple(range(len(searches[0].actions)))
         self.attempts = 0
         self.solved = -1
         self.best: tuple[int, ...] = ()
@@ -60,8 +62,11 @@ class _Search:
         if not going:
             return
         branches = []
+        tried: set[int] = set()
         for action in range(len(self.searches[0].actions)):
-            if action not in prefix:
+            # Where all problems agree on which actions are interchangeable, one of a class speaks for all.
+            if action not in prefix and self.classes[action] not in tried:
+                tried.add(self.classes[action])
                 survivors = [(i, after) for i, state in going if (after := self._after(i, state, action)) is not None]
                 branches.append((-len(survivors), action, survivors))
         # The hardiest first: a good order found early cuts the rest short.

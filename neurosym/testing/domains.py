@@ -101,13 +101,12 @@ def _walk(
                     f"{[search.actions[b] for b in done]}. Make `until` larger, or None."
                 )
             for learned, refusal in lessons:
-                broken = learned == a and isinstance(answer, Step) and not set(refusal.until) & set(done)
-                _require(
-                    not broken,
-                    f"{label} to refuse {search.actions[a]} in every state before one of "
-                    f"{[search.actions[u] for u in refusal.until]}, since it said so unconditionally",
-                    f"it was allowed after {[search.actions[b] for b in done]}",
-                )
+                if learned == a and isinstance(answer, Step) and not set(refusal.until) & set(done):
+                    raise ContractError(
+                        f"Expected {label} to refuse {search.actions[a]} in every state before one of "
+                        f"{[search.actions[u] for u in refusal.until]}, since it said so unconditionally; it was "
+                        f"allowed after {[search.actions[b] for b in done]}."
+                    )
             if isinstance(answer, Rejection):
                 if answer.unconditional and answer.until:
                     lessons.append((a, answer))
