@@ -1,8 +1,8 @@
 """Pictures of towers: one view from the side, raised a little, in an easy and in a hard setting.
 
 ``easy``  plumb towers in the middle of the picture, one light, one camera, the blocks' own colours, no noise.
-``hard``  as untidy as a tower can be that stands for sure: it stands off the middle (by up to 0.6 of a block's edge
-          along either axis), leans (each level up to 0.05 farther out) and its blocks lie askew (each up to 0.12 off).
+``hard``  an untidy tower that is sure to stand: it stands off the middle (by up to 0.4 of a block's edge along
+          either axis), leans (each level up to 0.05 farther out) and its blocks lie askew (each up to 0.12 off).
           The light comes from anywhere above and may be dim or harsh, a picture in four has cast shadows, each
           block's hue and brightness shift, the camera turns, rises and comes nearer, and there is pixel noise.
 
@@ -49,7 +49,7 @@ class Untidiness:
 
 
 #: The upper levels' centre of mass lies at most 3 leans and 2 jitters off the lowest block's middle: 0.39 of its edge.
-SETTINGS = {"easy": Untidiness(), "hard": Untidiness(shift=0.6, lean=0.05, jitter=0.12)}
+SETTINGS = {"easy": Untidiness(), "hard": Untidiness(shift=0.4, lean=0.05, jitter=0.12)}
 
 
 def setting_named(name: str) -> str:
