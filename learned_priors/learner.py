@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from learned_priors.losses import loss_of, targets_of
+from learned_priors.losses import cross_entropy, loss_of, targets_of
 from learned_priors.metrics import whole_order_accuracy
 from learned_priors.networks import Logits, NetworkConfig, OrderNetwork
 from learned_priors.recipes import TrainConfig
@@ -91,6 +92,22 @@ class Learner:
             classes=self.config.classes,
         )
         return loss, right
+
+    @torch.no_grad()
+    def calibrate(self, index: NDArray[np.int64]) -> float:
+        """Set the network's temperature to the one of the least cross-entropy on `index`; returns it."""
+        self.network.eval()
+        i = torch.from_numpy(index).to(self.device)
+        logits = Logits.joined([self.network(self.prepared[part]) for part in torch.split(i, CHUNK)])
+        target, before = self.target[i].to(torch.float64), self.network.config
+
+        def loss_at(temperature: float) -> float:
+            self.network.config = replace(before, temperature=temperature)
+            return float(cross_entropy(self.network.log_prob(logits), target, self.config.classes))
+
+        best = min((before.temperature * 2 ** (k / 4) for k in range(-8, 17)), key=loss_at)
+        self.network.config = replace(before, temperature=best)
+        return best
 
     def _autocast(self) -> torch.autocast:
         return torch.autocast(self.device.type, torch.bfloat16, enabled=self.config.precision == "bfloat16")

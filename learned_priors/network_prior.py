@@ -181,16 +181,18 @@ class NetworkPrior(Prior):
                 raise InputError(f"Expected at least one epoch; got {epochs}.")
             train = replace(train, epochs=epochs, least_steps=0)
         views, height, width, colours = demonstrations.pictures.shape[1:]
+        n_steps, n_actions = demonstrations.sequences.shape[1], len(demonstrations.actions)
+        head, neurons = self.recipe.head_for(n_steps, n_actions)
         network = NetworkConfig(
             encoder=self.encoder or "small",
-            head=self.recipe.head,
+            head=head,
             decoding=self.recipe.decoding,
             picture_shape=(views, height, width, colours),
-            n_steps=demonstrations.sequences.shape[1],
-            n_actions=len(demonstrations.actions),
-            width=self.recipe.width,
-            temperature=train.temperature,
-            stop=self.recipe.stop if demonstrations.lengths.min() < demonstrations.sequences.shape[1] else "none",
+            n_steps=n_steps,
+            n_actions=n_actions,
+            width=neurons,
+            temperature=train.temperature if self.recipe.decoding == "sinkhorn" else 1.0,
+            stop=self.recipe.stop if demonstrations.lengths.min() < n_steps else "none",
         )
         fitted = fit(
             demonstrations,

@@ -35,7 +35,7 @@ class NetworkConfig:
         picture_shape: (V, H, W, 3).
         n_steps, n_actions: T and N; T < N makes a rectangular head.
         width: neurons in the dense head's hidden layer, or latent dimensions a step of the temporal one.
-        temperature: of the Sinkhorn operator.
+        temperature: what the order's logits are divided by.
         stop: what tells how many of the T steps a task takes. "none": all of them; "head": a layer on the features of
             the one encoder; "network": a network of its own, with an encoder of its own (the paper's, Sec. IV-B);
             "class": one more action, to stop, at every step (the paper's extension of its temporal network).
@@ -146,10 +146,10 @@ class OrderNetwork(nn.Module):
         Rows of exp() sum to one, columns to at most one (Sinkhorn). In float64, where sums are exact enough that a
         picture read alone or in a batch stops at the same iteration.
         """
-        exact = logits.order.to(torch.float64)
+        exact = logits.order.to(torch.float64) / self.config.temperature
         if self.config.decoding == "rows":
             return torch.log_softmax(exact, dim=-1)
-        return log_sinkhorn(exact / self.config.temperature, tolerance=TOLERANCE, max_iterations=READ_ITERATIONS)
+        return log_sinkhorn(exact, tolerance=TOLERANCE, max_iterations=READ_ITERATIONS)
 
     def log_length(self, logits: Logits) -> Tensor | None:
         """Log-probabilities that the task takes 0 .. T steps, (B, T + 1), float64; None where it always takes T."""

@@ -33,6 +33,8 @@ class TrainConfig:
         held_out: share of the groups of demonstrations that is kept from training and only measured.
         keep: "last" or "best", the weights of the epoch with the least held-out loss.
         patience: stop when the held-out loss has not improved for so many epochs; None never stops early.
+        calibrate: divide the logits by the temperature that suits what is held out best (Guo et al., ICML 2017), if
+            anything is held out. It changes how sure the network is, hardly which order it prefers.
         precision: "float32" or "bfloat16" (autocast; pays for convolutions on hardware made for it).
         checkpoint_seconds: least time between two checkpoints, if one is asked for.
     """
@@ -55,6 +57,7 @@ class TrainConfig:
     held_out: float = 0.0
     keep: Literal["last", "best"] = "last"
     patience: int | None = None
+    calibrate: bool = False
     precision: Literal["float32", "bfloat16"] = "float32"
     checkpoint_seconds: float = 5.0
 
@@ -74,6 +77,7 @@ class Recipe:
         predicts: "assignment" (the Hungarian algorithm; no action twice) or "independent" (the likeliest of each
             step, which may be the same twice).
         trained_as: recipes that agree in it train the same network and read each other's weights.
+        few_steps: head and width where there are fewer steps than actions; None takes the same as elsewhere.
     """
 
     name: str
@@ -84,6 +88,11 @@ class Recipe:
     stop: Stop = "head"
     predicts: Literal["assignment", "independent"] = "assignment"
     trained_as: str = ""
+    few_steps: tuple[Head, int] | None = None
+
+    def head_for(self, n_steps: int, n_actions: int) -> tuple[Head, int]:
+        """Head and width for T steps of N actions."""
+        return self.few_steps if self.few_steps and n_steps < n_actions else (self.head, self.width)
 
     def __post_init__(self) -> None:
         if not self.trained_as:
@@ -102,7 +111,9 @@ _PAPER: dict[str, Any] = {
     "batch": 32,
     "weight_decay": 0.0,
 }
-_FULL: dict[str, Any] = {"soft": True, "sum_classes": True, "epochs": 80, "least_steps": 1500}
+# A temporal head names actions by one layer that all steps share. At 6 steps of 98 tiles, 3,000 pictures and 800
+# updates, that reads 96% of letters, the dense head 75%; where all actions are used, it is no better.
+_FULL: dict[str, Any] = {"soft": True, "sum_classes": True, "calibrate": True, "epochs": 80, "least_steps": 1500}
 
 _BC = Recipe("bc", "dense", 128, "rows", TrainConfig(loss="rows", **_PAPER), "class", "independent")
 _TCN = Recipe("tcn-paper", "tcn", 16, "rows", TrainConfig(loss="rows", **_PAPER), "class", "independent")
@@ -110,7 +121,7 @@ _TCN = Recipe("tcn-paper", "tcn", 16, "rows", TrainConfig(loss="rows", **_PAPER)
 RECIPES = {
     recipe.name: recipe
     for recipe in (
-        Recipe("sinkhorn", "dense", 128, "sinkhorn", TrainConfig(loss="sinkhorn", **_FULL)),
+        Recipe("sinkhorn", "dense", 128, "sinkhorn", TrainConfig(loss="sinkhorn", **_FULL), few_steps=("tcn", 32)),
         Recipe("tcn", "tcn", 32, "rows", TrainConfig(loss="rows", **_FULL)),
         Recipe(
             "sinkhorn-paper", "dense", 128, "sinkhorn", TrainConfig(loss="gumbel-sinkhorn", **_PAPER), stop="network"

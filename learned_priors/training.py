@@ -118,6 +118,8 @@ def fit(
     if config.keep == "best" and state.best:
         trained.load_state_dict(state.best)
     _round_to_half(trained)
+    if config.calibrate and len(held):
+        run.calibrate(held)
     return Fitted(trained.eval().requires_grad_(False), _header_figures(state, config, seed, epochs, learn, held, soft))
 
 

@@ -355,6 +355,25 @@ def test_the_small_encoder_pools_means(size: tuple[int, int]) -> None:
     torch.testing.assert_close(prepared.double() * 127.5 + 127.5, expected, atol=1e-4, rtol=0)
 
 
+@pytest.mark.parametrize("size", [(8, 24), (32, 192), (30, 65)])
+def test_the_small_encoder_cuts_long_pictures_into_squares(size: tuple[int, int]) -> None:
+    """A tile is prepared alike wherever it lies in its row; an upright picture is cut from the top."""
+    count = size[1] // size[0]
+    wide = np.random.default_rng(0).integers(0, 256, (2, 3, *size, 3), dtype=np.uint8)
+    expected = torch.nn.functional.adaptive_avg_pool2d(
+        torch.from_numpy(wide).flatten(0, 1).permute(0, 3, 1, 2).double(), (16, 16 * count)
+    )
+    squares = torch.stack(expected.chunk(count, dim=3), dim=1).permute(0, 1, 3, 4, 2).reshape(2, 3 * count, -1)
+    encoder = SmallEncoder((3, *size, 3)).eval()
+    prepared = encoder.prepare(torch.from_numpy(wide))
+    torch.testing.assert_close(prepared.double() * 127.5 + 127.5, squares, atol=1e-4, rtol=0)
+    assert encoder(prepared).shape == (2, encoder.out_features)
+    tall = np.ascontiguousarray(wide.swapaxes(2, 3))
+    turned = SmallEncoder((3, *size[::-1], 3)).prepare(torch.from_numpy(tall)).reshape(2, 3 * count, 16, 16, 3)
+    across = prepared.reshape(2, 3 * count, 16, 16, 3).transpose(2, 3)
+    torch.testing.assert_close(turned, across, atol=1e-5, rtol=0)
+
+
 def test_the_papers_encoder_has_the_papers_layers() -> None:
     encoder = build_encoder("paper", (4, 64, 64, 3))
     shapes = [tuple(p.shape) for p in encoder.parameters() if p.ndim > 1]

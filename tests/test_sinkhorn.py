@@ -45,6 +45,11 @@ def test_rows_and_columns_sum_to_one_in_float32(n: int, spread: float) -> None:
     assert_doubly_stochastic(log_sinkhorn(logits(n, spread, seed=n)))
 
 
+@pytest.mark.parametrize("spread", [0.1, 1000.0])
+def test_a_thousand_actions_in_float32(spread: float) -> None:
+    assert_doubly_stochastic(log_sinkhorn(logits(1000, spread, seed=1)))
+
+
 @settings(max_examples=40, deadline=None)
 @given(
     n=st.integers(1, 20),
