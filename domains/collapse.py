@@ -14,6 +14,7 @@ left decides where every cube lies.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from functools import cache
 
@@ -21,8 +22,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from neurosym.errors import AssemblyError
+from neurosym.geometry import collision
 from neurosym.geometry.assembly import Assembly, Box
 from neurosym.geometry.blocking import bits
+from neurosym.geometry.contacts import TABLE, near_pairs
 from neurosym.geometry.sweep import drops_onto
 from neurosym.language import Derived, Fluent, State
 from neurosym.problem import Verdict
@@ -31,6 +34,9 @@ RULES = ("cubes", "strict", "rigid")
 
 #: Moving cubes that are still no collapse (the paper: "any", by its code more than one).
 MAY_MOVE = {"cubes": 1, "strict": 0}
+
+#: How far cubes over one another may be out of line, as a share of their edge.
+SQUARELY = 0.01
 
 _DOWN = np.array([[0.0, 0.0, -1.0]])
 
@@ -149,28 +155,71 @@ def check_cubes(world: Assembly, rule: str) -> None:
     vertical = np.abs(world.X_WB[:, 2, :3]).max(axis=1)
     if vertical.min() < 1 - 1e-6:
         raise AssemblyError(f"Expected upright cubes, an axis of each along z; some are tilted. {advice}")
+    frame = world.X_WB[0, :3, :3]
+    turned = np.abs(frame.T @ world.X_WB[:, :3, :3]).max(axis=1).min()
+    # Where cubes lie over one another, they must do so squarely: a cube over halves of two might fall either way.
+    centres = (world.X_WB[:, :3, 3] - world.X_WB[0, :3, 3]) @ frame / sizes.min()
+    level = centres[:, np.abs(frame[2]) < 0.5]
+    apart = np.abs(level[:, None] - level[None])
+    over = (apart < 1 - SQUARELY).all(axis=2)
+    if turned < 1 - 1e-6 or (over & (apart > SQUARELY).any(axis=2)).any():
+        raise AssemblyError(f"Expected cubes on one grid, squarely over one another; some overhang others. {advice}")
 
 
-def check_standing(world: Assembly, rule: str) -> None:
-    """Refuse an assembly that floats: a piece (under `cubes` any cube) with nothing under it."""
-    if rule == "cubes":
+def check_standing(world: Assembly, rule: str, gone: Collection[str] = ()) -> None:
+    """Refuse a start that floats or falls by itself: under `cubes` a cube, else a piece, with nothing to stand on."""
+    present = (1 << len(world)) - 1 & ~world.mask(gone)
+    if rule == "cubes" and not gone:
         # A cube may stand on its own piece: the rule takes the pieces' cubes for independent.
-        for cube, z in _settled(world, (1 << len(world)) - 1).items():
+        for cube, z in _settled(world, present).items():
             if world.X_WB[cube, 2, 3] - z > world.smallest_extent / 2:
                 at = ", ".join(f"{v:.3g}" for v in world.X_WB[cube, :3, 3])
                 raise AssemblyError(
                     f"Piece {world.names[world.owners[cube]]!r}: its cube ({at}) is floating. Under the rule 'cubes' "
                     "each cube is a body of its own and would fall at once; use collapse='rigid' or 'strict'."
                 )
-    carried: set[int] = set()
+    if rule == "cubes":
+        return  # columns are always settled, whatever was taken away
+    # Whoever stands on the table, then whoever stands on those, and so on.
+    carriers: dict[int, set[int]] = {}
     for contact in world.contacts():
+        a, b = int(world.owners[contact.a]), TABLE if contact.b == TABLE else int(world.owners[contact.b])
         if contact.normal[2] < -0.7:
-            carried.add(int(world.owners[contact.a]))
+            carriers.setdefault(b, set()).add(a)
         elif contact.normal[2] > 0.7:
-            carried.add(int(world.owners[contact.b]))
-    for number, name in enumerate(world.names):
-        if number not in carried:
+            carriers.setdefault(a, set()).add(b)
+    held, waiting = {TABLE}, [TABLE]
+    while waiting:
+        for carried in carriers.get(waiting.pop(), set()) - held:
+            if present >> carried & 1:
+                held.add(carried)
+                waiting.append(carried)
+    for number in bits(present):
+        if number not in held:
             raise AssemblyError(
-                f"Piece {name!r} is floating: it stands neither on another piece nor on the table (z is up, the table "
-                f"is at z = {world.ground:g}). Move it down, or leave it out."
+                f"Piece {world.names[number]!r} is floating: nothing that it stands on reaches the table (z is up, the "
+                f"table is at z = {world.ground:g}). Move it down, or leave it out."
+            )
+    if rule == "rigid":
+        standing = world.stability().standing(present)
+        if not standing.stands:
+            falling = ", ".join(world.in_mask(standing.moving))
+            raise AssemblyError(
+                f"Expected a start that stands by itself; {falling} would fall at once. Support it, or raise the "
+                f"friction (it is {world.friction:g})."
+            )
+
+
+def check_overlaps(world: Assembly) -> None:
+    """Refuse boxes of different pieces that overlap by more than the touching tolerance."""
+    touch = world.touch
+    boxes = {i for i, b in enumerate(world.bodies) if isinstance(b.shape, Box)}
+    for a, b in near_pairs(world.body_bounds, world.owners, -touch):
+        if a in boxes and b in boxes and collision.collide(
+            collision.shape_object(world.bodies[a].shape, world.X_WB[a], -touch / 2),
+            collision.shape_object(world.bodies[b].shape, world.X_WB[b], -touch / 2),
+        ):
+            raise AssemblyError(
+                f"Pieces {world.names[world.owners[a]]!r} and {world.names[world.owners[b]]!r} overlap by more than "
+                f"{touch:g}; expected pieces that at most touch. Move one of them."
             )

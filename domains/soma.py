@@ -12,7 +12,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from domains.collapse import RULES, check_cubes, check_standing, keeps_standing
+from domains.collapse import RULES, check_cubes, check_overlaps, check_standing, keeps_standing
 from domains.soma_demonstrations import demonstrate, picture_seed
 from domains.soma_pieces import LETTERS, Cell, solutions
 from neurosym import predicates
@@ -21,6 +21,7 @@ from neurosym.errors import AssemblyError, InputError, UnknownNameError
 from neurosym.family import ProblemFamily, Progress
 from neurosym.geometry.assembly import Assembly
 from neurosym.language import Action, Domain, Fluent, Problem, Simulation, Type
+from neurosym.language.domain import as_names
 
 piece = Type("piece")
 present = Fluent("present", piece)
@@ -42,6 +43,9 @@ DOMAINS: dict[str, Domain] = {rule: _take_apart(rule) for rule in RULES}
 
 #: Numbers of `problems("train")` in a split: half of the 240, as in the paper.
 N_TRAIN = 120
+
+#: Styles of pictures.
+STYLES = ("clean", "varied")
 
 #: Kept apart from any user's seed, so that a split never repeats the draws of a search.
 _SPLIT_STREAM = 0x50_4D_41
@@ -101,7 +105,7 @@ class SomaFamily(ProblemFamily):
             cubes[number],
             collapse=collapse,
             pictures=pictures,
-            seed=picture_seed(seed, int(number)),
+            seed=picture_seed(seed, int(number)) if isinstance(seed, int) and seed >= 0 else seed,
             removed=removed,
             before=before,
             name=f"soma-{number}",
@@ -117,10 +121,9 @@ class SomaFamily(ProblemFamily):
         """
         if not isinstance(cells, Mapping) or not cells:
             raise AssemblyError(f"Expected pieces as {{name: [(x, y, z), ...]}}, at least one; got {cells!r}.")
-        given = {str(name): [tuple(c) for c in own] for name, own in cells.items()}
-        assembly = Assembly.from_cells(given)
-        for name, own in given.items():
-            _check_connected(name, own)
+        assembly = Assembly.from_cells(cells)
+        for name, own in cells.items():
+            _check_connected(name, [tuple(c) for c in own])
         return self.problem_from_assembly(assembly, collapse=collapse, **options)
 
     def problem_from_assembly(
@@ -137,13 +140,20 @@ class SomaFamily(ProblemFamily):
         """A puzzle given as an assembly: cells or meshes, in any upright pose."""
         if collapse not in DOMAINS:
             raise UnknownNameError("collapse rule", collapse, DOMAINS)
-        gone = tuple(removed)
+        if not isinstance(assembly, Assembly):
+            raise InputError(f"Expected an Assembly; got {assembly!r}. For cells there is problem_from_cells.")
+        if pictures not in STYLES:
+            raise UnknownNameError("style of pictures", pictures, STYLES)
+        if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
+            raise InputError(f"Expected a seed, an integer of 0 or more; got {seed!r}.")
+        gone = as_names(removed, "removed")
         for letter in gone:
             if letter not in assembly.names:
                 raise UnknownNameError("piece", letter, assembly.names)
+        check_overlaps(assembly)
         if collapse != "rigid":
             check_cubes(assembly, collapse)
-        check_standing(assembly, collapse)
+        check_standing(assembly, collapse, gone)
         # No simulation judges `strict`: what is left over a removed cube need not move.
         simulation = None
         if collapse != "strict":

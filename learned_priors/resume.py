@@ -71,7 +71,7 @@ def load_state(path: Path, mark: str, network: OrderNetwork, optimizer: torch.op
     if header.get("kind") != _KIND or header.get("fingerprint") != mark:
         raise CheckpointError(
             f"Expected the checkpoint {path} to be of this run; it was made with other demonstrations, settings or "
-            "seed. Delete it, name another file, or pass resume=False to start over."
+            "seed. Delete it, name another file, or start over (resume=False; --no-resume on the command line)."
         )
     given = header["state"]
     state = RunState(**{**given, "best_loss": math.inf if given["best_loss"] is None else given["best_loss"]})

@@ -46,7 +46,7 @@ _HOMES = {
         "Type",
         "derived",
     ),
-    "neurosym.pipeline": ("count_plans", "solve"),
+    "neurosym.pipeline": ("count_plans", "plans", "solve"),
     "neurosym.planner": ("Budget", "Planner", "PlannerTraits", "PlanResult", "Refusal", "SearchLog", "Status"),
     "neurosym.prior": ("OrderScores", "Prior", "RandomPrior", "UniformPrior"),
     "neurosym.problem": ("Rejection", "SearchProblem", "Step", "Verdict"),
@@ -108,6 +108,7 @@ if TYPE_CHECKING:
     from neurosym.language import Type as Type
     from neurosym.language import derived as derived
     from neurosym.pipeline import count_plans as count_plans
+    from neurosym.pipeline import plans as plans
     from neurosym.pipeline import solve as solve
     from neurosym.planner import Budget as Budget
     from neurosym.planner import Planner as Planner

@@ -111,17 +111,23 @@ class Demonstrations:
     def load(cls, path: str | Path) -> Demonstrations:
         """Read what `save` wrote, or a user's own ``.npz`` with pictures, sequences and actions."""
         try:
-            with np.load(path, allow_pickle=False) as file:
+            with np.load(path, allow_pickle=False) as file:  # a lone array has no `files`
                 data = {name: file[name] for name in file.files}
         except FileNotFoundError:
             raise DemonstrationError(f"Expected demonstrations at {path}; there is no such file.") from None
-        except (OSError, ValueError, zipfile.BadZipFile, EOFError, AttributeError) as error:
+        except (OSError, ValueError, zipfile.BadZipFile, EOFError, AttributeError, TypeError) as error:
             raise DemonstrationError(f"Expected {path} to be an .npz file of plain arrays; got: {error}.") from None
         missing = [k for k in ("pictures", "sequences", "actions") if k not in data]
         if missing:
             raise DemonstrationError(
                 f"Expected the arrays pictures, sequences and actions in {path}; missing: {', '.join(missing)}."
             )
+        schema = data.get("schema", np.array(SCHEMA))
+        if schema.shape != () or schema.item() != SCHEMA:
+            raise DemonstrationError(f"Expected demonstrations of schema {SCHEMA} in {path}; got {schema!s}.")
+        names = np.atleast_1d(data.get("actions", np.array([""])))
+        if names.dtype.kind != "U" or names.ndim != 1:
+            raise DemonstrationError(f"Expected actions in {path} as a list of text; got {names.dtype} {names.shape}.")
         return cls(
             data["pictures"],
             data["sequences"],
@@ -148,6 +154,9 @@ def _checked_sequences(given: ArrayLike, m: int, actions: tuple[str, ...]) -> ND
         row = int(np.argwhere(wrong)[0, 0])
         raise DemonstrationError(f"Expected actions 0 to {n - 1}, or -1 as padding; row {row} has {sequences[row]}.")
     used = sequences >= 0
+    if not used.any(axis=1).all():
+        row = int(np.flatnonzero(~used.any(axis=1))[0])
+        raise DemonstrationError(f"Expected at least one action in a sequence; row {row} has {sequences[row]}.")
     gap = (~used[:, :-1] & used[:, 1:]).any(axis=1)
     if gap.any():
         row = int(np.flatnonzero(gap)[0])
@@ -161,7 +170,10 @@ def _checked_sequences(given: ArrayLike, m: int, actions: tuple[str, ...]) -> ND
 
 
 def _checked_marginals(given: ArrayLike, shape: tuple[int, int, int]) -> NDArray[np.float32]:
-    marginals = np.asarray(given, dtype=np.float32)
+    try:
+        marginals = np.asarray(given, dtype=np.float32)
+    except (TypeError, ValueError):
+        raise DemonstrationError(f"Expected marginals as numbers {shape}; got {np.asarray(given).dtype}.") from None
     if marginals.shape != shape:
         raise DemonstrationError(f"Expected marginals of shape (M, T, N) = {shape}; got {marginals.shape}.")
     sums = marginals.sum(axis=2)

@@ -41,7 +41,8 @@ class UnknownNameError(InputError, LookupError):
     def __init__(self, kind: str, name: object, known: Iterable[str], *, hint: str = "") -> None:
         names = sorted(known)
         close = difflib.get_close_matches(str(name), names, n=1)
-        message = f"Expected the name of a {kind}, one of {', '.join(names) or '(none)'}; got {name!r}."
+        article = "an" if kind[0] in "aeiou" else "a"
+        message = f"Expected the name of {article} {kind}, one of {', '.join(names) or '(none)'}; got {name!r}."
         if close:
             message += f" Did you mean {close[0]!r}?"
         if hint:

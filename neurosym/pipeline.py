@@ -5,19 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from neurosym.errors import ContractError, InputError
+from neurosym.language.domain import Problem
 from neurosym.planner import Budget, Planner, PlanResult
 from neurosym.prior import OrderScores, Prior
 from neurosym.problem import SearchProblem
 from neurosym.registry import load_planner, load_prior
 from neurosym.validation import replay, validate
-
-if TYPE_CHECKING:
-    from neurosym.language.domain import Problem
 
 ORACLES = ("geometry", "physics")
 
@@ -67,6 +65,13 @@ def plans(
         raise InputError(f"Expected a planner that gives several plans, best-first or exhaustive; got {planner!r}.")
     if k is not None and k < 1:
         raise InputError(f"Expected k of at least 1; got {k}.")
+    if not isinstance(problem, Problem):
+        raise InputError(f"Expected a Problem, as Domain.problem makes it; got {problem!r}.")
+    if budget is not None and not isinstance(budget, Budget):
+        raise InputError(f"Expected a Budget, for instance Budget(seconds=10); got {budget!r}.")
+    seeded = rng is None or (isinstance(rng, int | np.integer) and not isinstance(rng, bool) and rng >= 0)
+    if not seeded and not isinstance(rng, np.random.Generator):
+        raise InputError(f"Expected rng as a numpy Generator or a seed of 0 or more; got {rng!r}.")
     generator = rng if isinstance(rng, np.random.Generator) else np.random.default_rng(0 if rng is None else rng)
     scores = advice(problem, prior)
     with ExitStack() as stack:
@@ -85,7 +90,13 @@ def advice(problem: Problem, prior: str | Path | Prior | OrderScores | None) -> 
     """A prior's scores for the action primitives of a problem, in their order."""
     if prior is None:
         return None
-    scores = prior if isinstance(prior, OrderScores) else load_prior(prior).scores([problem])[0]
+    if isinstance(prior, OrderScores):
+        scores = prior
+    else:
+        given = load_prior(prior).scores([problem])
+        if not isinstance(given, list | tuple) or len(given) != 1 or not isinstance(given[0], OrderScores):
+            raise ContractError(f"Expected the prior {prior!r} to give one OrderScores a problem; got {given!r}.")
+        scores = given[0]
     return scores.restricted(problem.actions) if scores.actions else scores
 
 

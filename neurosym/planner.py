@@ -55,8 +55,10 @@ class Budget:
     def __post_init__(self) -> None:
         for name in ("seconds", "attempts", "expansions"):
             value = getattr(self, name)
-            if value is not None and not value >= 0:
-                raise InputError(f"Expected {name} of a budget to be 0 or more; got {value!r}.")
+            whole = name == "seconds" or isinstance(value, int | np.integer)
+            if value is not None and not (isinstance(value, int | float | np.number) and whole and value >= 0):
+                kind = "a number" if name == "seconds" else "an integer"
+                raise InputError(f"Expected {name} of a budget to be {kind}, 0 or more; got {value!r}.")
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from neurosym.errors import UnknownNameError
+from neurosym.errors import InputError, UnknownNameError
 from neurosym.language.state import AtomSet
 from neurosym.language.terms import Derived, Literal
 from neurosym.problem import Rejection, SearchProblem
@@ -42,12 +42,16 @@ def validate(problem: Problem, order: Sequence[str]) -> Validation:
     Raises:
         UnknownNameError: a name that is no action of the problem's domain.
     """
+    if not hasattr(problem, "domain"):
+        raise InputError(f"Expected a Problem, as Domain.problem makes it; got {problem!r}.")
+    if not isinstance(order, Sequence):
+        raise InputError(f"Expected an order as a list of names of action primitives; got {order!r}.")
     ground = {}
     for action in problem.domain.actions:
         for binding in problem.bindings(action):
             ground[action.ground_name(binding)] = (action, binding)
     for name in order:
-        if name not in ground:
+        if not isinstance(name, str) or name not in ground:
             raise UnknownNameError("action primitive", name, ground)
     world = problem.world.afresh() if hasattr(problem.world, "afresh") else problem.world
     state = AtomSet(set(problem.init), tuple(problem.type_of))
@@ -66,7 +70,11 @@ def validate(problem: Problem, order: Sequence[str]) -> Validation:
 
     for step, name in enumerate(order):
         if name in done:
-            return Validation(False, step, (name,), f"{name} was done already, as step {done.index(name)}.")
+            # What the domain itself says of doing it again, a tower that comes down for instance, is worth hearing.
+            action, binding = ground[name]
+            again = failure([p.bind(binding) for p in action.pre])
+            said = f"{name} was done already, as step {done.index(name)}." + (f" {again[1]}" if again else "")
+            return Validation(False, step, (name,), said)
         for first, then in problem.before:
             if then == name and first in possible and first not in done:
                 return Validation(False, step, (first,), f"{name} may be done only after {first}.")

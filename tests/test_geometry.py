@@ -304,3 +304,78 @@ def test_friction_holds_a_wedge_only_when_there_is_enough():
 def test_bad_geometry_is_refused_with_the_reason(make, says):
     with pytest.raises(ns.InputError, match=says):
         make()
+
+
+@pytest.mark.parametrize("degrees", [0, 20, 45, 70])
+@pytest.mark.parametrize("side", [-0.05, 0.05])
+def test_friction_is_as_stated_in_every_direction(degrees, side):
+    """A block on a ramp slides at tan(slope) = friction, to 5%, wherever the ramp faces."""
+    friction = 0.5
+    slope = friction * (1 + side)
+    ramp = trimesh.convex.convex_hull(
+        np.array([[0, 0, 0], [6, 0, 0], [0, 4, 0], [6, 4, 0], [0, 0, 6 * slope], [0, 4, 6 * slope]])
+    )
+    block = trimesh.creation.box((2, 2, 0.1))
+    block.apply_translation((0, 0, 0.05))
+    block.apply_transform(motion(np.degrees(np.arctan(slope)), "y"))
+    block.apply_translation((3, 2, 3 * slope))
+    turn = motion(degrees)
+    meshes = {"ramp": ramp.apply_transform(turn), "block": block.apply_transform(turn)}
+    assembly = ns.Assembly.from_meshes(meshes, friction=friction)
+    assert assembly.stability().standing(0b11).stands is (side < 0)
+
+
+def boundary_mesh(cells, X):
+    """The clean outer surface of a polycube: only outer faces, merged vertices."""
+    own = set(map(tuple, cells))
+    corners, faces = [], []
+    for cell in own:
+        for axis in range(3):
+            for sign in (-1, 1):
+                neighbour = list(cell)
+                neighbour[axis] += sign
+                if tuple(neighbour) in own:
+                    continue
+                u, v = (axis + 1) % 3, (axis + 2) % 3
+                square = []
+                for du, dv in ((0, 0), (1, 0), (1, 1), (0, 1)):
+                    corner = list(cell)
+                    corner[axis] += sign > 0
+                    corner[u] += du
+                    corner[v] += dv
+                    square.append(corner)
+                if sign < 0:
+                    square.reverse()
+                k = len(corners)
+                corners += square
+                faces += [[k, k + 1, k + 2], [k, k + 2, k + 3]]
+    mesh = trimesh.Trimesh(np.array(corners, dtype=float), faces, process=True)
+    mesh.apply_transform(X)
+    return mesh
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e3, 1e-3])
+@pytest.mark.parametrize(("degrees", "shift"), [(30, (10, -30, 2)), (17.3, (500, 700, 100)), (45, (0, 0, 0))])
+def test_meshes_far_from_the_origin_touch_as_they_should(scale, degrees, shift):
+    X = motion(degrees, "z", shift)
+    X = np.diag([scale, scale, scale, 1]) @ X
+    for number in (17, 100):
+        cells = ns.load_domain("soma").solutions()[number]
+        assembly = ns.Assembly.from_meshes({name: boundary_mesh(own, X) for name, own in cells.items()})
+        areas = [c.area / scale**2 for c in assembly.contacts()]
+        assert len(areas) == len(ns.Assembly.from_cells(cells).contacts())
+        np.testing.assert_allclose(areas, 1.0, rtol=1e-6)
+
+
+def test_large_boxes_stay_single_boxes():
+    """A table in millimetres is six boxes, not thousands of cubes of its finest step."""
+    parts = {"top": ((1200, 1200, 20), (0, 0, 710))}
+    places = enumerate(itertools.product((-500, 500), repeat=2))
+    parts |= {f"leg{k}": ((60, 60, 700), (x, y, 350)) for k, (x, y) in places}
+    meshes = {
+        name: trimesh.creation.box(size, trimesh.transformations.translation_matrix(place))
+        for name, (size, place) in parts.items()
+    }
+    assembly = ns.Assembly.from_meshes(meshes)
+    assert len(assembly.bodies) == 5
+    assert assembly.stability().standing(0b11111).stands

@@ -83,6 +83,16 @@ def test_a_planner_that_lies_is_found_out():
         ns.solve(soma.problem(17), planner=Liar())
 
 
+@pytest.mark.parametrize("answer", [[], [None], np.zeros((7, 7))])
+def test_a_prior_that_answers_with_something_else_is_found_out(answer):
+    class Odd(ns.Prior):
+        def scores(self, problems):
+            return answer
+
+    with pytest.raises(ns.ContractError, match="one OrderScores"):
+        ns.solve(soma.problem(17), prior=Odd())
+
+
 def test_k_best_plans_are_different_and_in_order():
     problem = soma.problem(17)
     scores = ns.OrderScores(np.random.default_rng(0).standard_normal((7, 7)), problem.actions)
@@ -130,6 +140,16 @@ def test_scores_of_other_actions_are_refused():
         (lambda: ns.load_prior("nowhere/file.safetensors"), "none is there"),
         (lambda: ns.load_planner("swap-repair", speed=3), "options"),
         (lambda: ns.Budget(seconds=-1), "0 or more"),
+        (lambda: ns.Budget(seconds="1"), "a number"),
+        (lambda: ns.Budget(attempts=3.5), "an integer"),
+        (lambda: ns.solve(soma.problem(0), budget=5), "a Budget"),
+        (lambda: ns.solve(soma.problem(0), rng=-1), "seed"),
+        (lambda: ns.solve(soma.problem(0), rng="a"), "seed"),
+        (lambda: ns.solve(None), "a Problem"),
+        (lambda: ns.validate(None, []), "a Problem"),
+        (lambda: ns.validate(soma.problem(0), None), "list of names"),
+        (lambda: ns.validate(soma.problem(0), {"V"}), "list of names"),
+        (lambda: ns.validate(soma.problem(0), [["V"]]), "action primitive"),
     ],
 )
 def test_wrong_calls_say_what_was_expected(call, says):

@@ -137,6 +137,18 @@ def test_turned_cubes_and_meshes_have_the_same_orders(rule):
         assert found[0] == found[1] == found[2]
 
 
+def test_rigid_orders_do_not_depend_on_the_heading():
+    """Friction knows no axes: the cubes that a world-fixed friction pyramid got wrong have the same verdicts turned."""
+    for number in (48, 192, 216):
+        answers = []
+        for degrees in (0, 17.3, 30, 45):
+            X = np.eye(4)
+            X[:3, :3] = Rotation.from_euler("z", degrees, degrees=True).as_matrix()
+            stability = ns.Assembly.from_cells(soma.solutions()[number]).transformed(X).stability()
+            answers.append([stability.standing(subset).stands for subset in range(1, 128)])
+        assert answers[0] == answers[1] == answers[2] == answers[3]
+
+
 def orders(problem) -> frozenset[tuple[str, ...]]:
     return frozenset(ns.load_planner("exhaustive").all_plans(problem.ground()))
 
@@ -241,6 +253,14 @@ def test_rigid_pieces_may_be_locked_for_good():
     assert any("bar" in r.because for r in result.blame if r.action == "frame")
 
 
+#: Two hooks that carry each other in mid-air.
+HOVERING = {
+    "foot": [(9, 0, 0)],
+    "a": [(0, 0, 3), (1, 0, 3), (1, 0, 4), (1, 0, 5), (0, 0, 5)],
+    "b": [(0, 0, 4), (-1, 0, 4)],
+}
+
+
 @pytest.mark.parametrize(
     ("cells", "rule", "says"),
     [
@@ -256,6 +276,14 @@ def test_rigid_pieces_may_be_locked_for_good():
         ({"a": [(0, 0, 0)], "b": [(0, 0, 5)]}, "rigid", "floating"),
         ({"a": [(0, 0, 0)], "b": [(0, 0, 1), (1, 0, 1)]}, "cubes", "floating"),
         ({"a": [(0, 0, 0)]}, "cube", "collapse rule"),
+        ({"a": 5}, "cubes", "list of cells"),
+        ({"a": None}, "cubes", "list of cells"),
+        ({1: [(0, 0, 0)], "1": [(0, 0, 1)]}, "cubes", "names of parts"),
+        ({"a": [(10**9, 0, 0)]}, "cubes", "of the origin"),
+        ({"a": [(float("inf"), 0, 0)]}, "cubes", "three integers"),
+        ({"a": [(0, 0, 0)], "b": [(0, 0, 1), (1, 0, 1), (2, 0, 1), (3, 0, 1)]}, "rigid", "b would fall at once"),
+        (HOVERING, "rigid", "floating"),
+        (HOVERING, "strict", "floating"),
     ],
 )
 def test_bad_puzzles_are_refused_with_the_reason(cells, rule, says):
@@ -274,6 +302,44 @@ def test_shapes_that_are_no_cubes_are_refused_except_by_rigid():
     assembly = ns.Assembly.from_meshes({"ball": ball})
     with pytest.raises(ns.AssemblyError, match="equal cubes"):
         soma.problem_from_assembly(assembly)
+
+
+def boxes(places):
+    from neurosym.geometry.assembly import boxes_part
+
+    return ns.Assembly(tuple(boxes_part(n, np.array(c, dtype=float), np.ones(3)) for n, c in places.items()))
+
+
+def test_pieces_that_overlap_or_overhang_are_refused():
+    overlapping = boxes({"a": [(0.5, 0.5, 0.5)], "b": [(1.2, 0.5, 0.5)]})
+    with pytest.raises(ns.AssemblyError, match="'a' and 'b' overlap"):
+        soma.problem_from_assembly(overlapping, collapse="rigid")
+    across = boxes({"a": [(0.5, 0.5, 0.5)], "b": [(1.5, 0.5, 0.5)], "c": [(1.0, 0.5, 1.5)]})
+    for rule in ("cubes", "strict"):
+        with pytest.raises(ns.AssemblyError, match="squarely"):
+            soma.problem_from_assembly(across, collapse=rule)
+    assert orders(soma.problem_from_assembly(across, collapse="rigid")) == {("c", "a", "b"), ("c", "b", "a")}
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"removed": None},
+        {"removed": 5},
+        {"removed": "V"},
+        {"removed": ["v"]},
+        {"before": None},
+        {"before": "LT"},
+        {"before": [("L",)]},
+        {"before": {"L": "T"}},
+        {"pictures": "foo"},
+        {"seed": -1},
+        {"seed": "x"},
+    ],
+)
+def test_bad_options_are_refused(options):
+    with pytest.raises(ns.NeurosymError, match=r"[Ee]xpected"):
+        soma.problem(17, **options)
 
 
 def test_the_demonstrator_has_a_valid_habit():

@@ -68,14 +68,19 @@ def compare(
 
     Writes results.csv, results.md and iterations.png. Finished runs are kept in DIR/runs.jsonl: interrupted, or asked
     again with one more prior, it does only the rest.
+    `solved` counts the problems that were solved under every seed; means are over problems x seeds.
     Without --out, files go to out/compare-DOMAIN (with --json nowhere).
     """
     from neurosym.benchmark import Comparison, Outcome, image_blind, run
     from neurosym.registry import load_domain
     from neurosym.reporting import rows
 
+    if out is not None and out.exists() and not out.is_dir():
+        raise InputError(f"Expected --out to be a folder; {out} is a file.")
     family = load_domain(domain)
     own = family_options(option)
+    only_numbers = taken_by(family.numbers, own).keys() - taken_by(family.problem, own).keys()
+    of_problems = {k: v for k, v in own.items() if k not in only_numbers}
     folder = out if out is not None or as_json else Path("out") / f"compare-{domain}"
     processes = workers or cores()
     comparison = Comparison(
@@ -83,7 +88,7 @@ def compare(
         numbers=_numbers(family, problems, split, own),
         planners=_once(planner or PLANNERS),
         priors=_once(prior or PRIORS),
-        options=problem_options(family, collapse=collapse, pictures=_style(family, pictures)) | own,
+        options=problem_options(family, collapse=collapse, pictures=_style(family, pictures)) | of_problems,
         oracle=oracle.value,
         seeds=seeds,
     )

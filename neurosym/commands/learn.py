@@ -71,6 +71,8 @@ def train(
 
     _check_suffix(out, ".safetensors")
     load_domain(domain)
+    if demos_file is not None and (split or option or pictures is not Pictures.clean):
+        raise InputError("Expected --split, --pictures and --option only without --demos, whose file has it all.")
     learner: Any = load_prior(prior, **({"encoder": encoder} if encoder else {}))
     if not (hasattr(learner, "fit") and hasattr(learner, "save")):
         raise InputError(f"Expected a prior that can be trained; {prior!r} cannot (it has no fit and save).")

@@ -115,6 +115,15 @@ def plan(
     raise typer.Exit(results[0].status.exit_code)
 
 
+def _each_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """A JSON object whose keys differ: of two pieces of one name, JSON itself would silently drop the first."""
+    names = [key for key, _ in pairs]
+    twice = sorted({n for n in names if names.count(n) > 1})
+    if twice:
+        raise ValueError(f"{', '.join(twice)} comes twice")
+    return dict(pairs)
+
+
 def _problem(family: ProblemFamily, number: int | None, cells: Path | None, options: dict[str, Any]) -> Problem:
     if (number is None) == (cells is None):
         raise InputError("Expected either --problem N or --cells FILE, one of them.")
@@ -127,7 +136,7 @@ def _problem(family: ProblemFamily, number: int | None, cells: Path | None, opti
     if make is None:
         raise InputError(f"Expected a domain of polycube puzzles (soma) for --cells; {family.name!r} is none.")
     try:
-        given = json.loads(cells.read_text(encoding="utf-8"))
+        given = json.loads(cells.read_text(encoding="utf-8"), object_pairs_hook=_each_once)
     except ValueError as error:
         raise InputError(f'Expected JSON {{"name": [[x, y, z], ...]}} in {cells}; got: {error}.') from None
     if not isinstance(given, dict) or not all(isinstance(own, list) for own in given.values()):
@@ -186,7 +195,7 @@ def _show(problem: Problem, results: Sequence[PlanResult], answer: dict[str, Any
     counts = {"iteration": best.iterations, "attempt": best.attempts, "expansion": best.expansions}
     said = ", ".join(f"{n} {what}{'' if n == 1 else 's'}" for what, n in counts.items())
     print(f"{said}, {1000 * best.seconds:.1f} ms")
-    for rank, other in enumerate(results[1:], 2):
+    for rank, other in enumerate(results if len(results) > 1 else (), 1):
         cost = "" if other.cost is None else f"  (cost {other.cost:.3f} nats)"
         print(f"plan {rank}: {' '.join(other.plan or ())}{cost}")
 

@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 T = TypeVar("T")
 
+#: Cells farther from the origin than this are refused: lengths would lose their last digits.
+MAX_COORDINATE = 1_000_000
+
 #: Corners of a unit box about the origin, and its twelve triangles with outward normals.
 _CORNERS = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
 _BOX_FACES = np.array(
@@ -142,7 +145,13 @@ class Assembly:
             raise AssemblyError(f"Expected a cell size above 0; got {size!r}.")
         owner: dict[tuple[int, int, int], str] = {}
         parts = []
+        if not isinstance(cells, Mapping):
+            raise AssemblyError(f"Expected parts as {{name: [(x, y, z), ...]}}; got {cells!r}.")
         for name, given in cells.items():
+            if not isinstance(name, str) or not name:
+                raise AssemblyError(f"Expected names of parts that are text; got {name!r}.")
+            if not isinstance(given, Iterable):
+                raise AssemblyError(f"Part {name!r}: expected a list of cells (x, y, z); got {given!r}.")
             triples = [_cell(name, c) for c in given]
             if not triples:
                 raise AssemblyError(f"Expected part {name!r} to have at least one cell; it is empty.")
@@ -172,6 +181,8 @@ class Assembly:
         """
         from neurosym.geometry.meshes import parts_from_meshes
 
+        if not isinstance(meshes, Mapping):
+            raise AssemblyError(f"Expected parts as {{name: mesh}}; got {type(meshes).__name__}.")
         return cls(parts_from_meshes(meshes, tolerances), table, friction, tolerances)
 
     def transformed(self, X: ArrayLike) -> Assembly:
@@ -344,11 +355,13 @@ def boxes_part(name: str, centres: Array, size: Array, X_WP: Array | None = None
 def _cell(name: str, cell: Sequence[int]) -> tuple[int, int, int]:
     try:
         array = np.asarray(cell)
-        whole = array.shape == (3,) and bool(np.all(np.equal(np.mod(array, 1), 0)))
+        whole = array.shape == (3,) and bool(np.isfinite(array).all() and (array == np.round(array)).all())
     except (TypeError, ValueError):
         whole = False
     if not whole:
         raise AssemblyError(f"Part {name!r}: expected cells (x, y, z) of three integers; got {cell!r}.")
+    if np.abs(array).max() > MAX_COORDINATE:
+        raise AssemblyError(f"Part {name!r}: expected cells within {MAX_COORDINATE:,} of the origin; got {cell!r}.")
     x, y, z = (int(v) for v in array)
     return x, y, z
 

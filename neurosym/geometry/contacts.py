@@ -1,7 +1,8 @@
 """Where parts touch: points, normals and areas.
 
-Boxes: FCL clips face against face, exactly. Anything else: coplanar facets with opposite normals are clipped
-here, since FCL's depths and normals between meshes are not usable; FCL says which pairs are near at all.
+Boxes: FCL finds the pairs and their normals, and their faces are clipped exactly. Anything else: coplanar facets
+with opposite normals are clipped, since FCL's depths and normals between meshes are not usable; FCL says which pairs
+are near at all.
 """
 
 from __future__ import annotations
@@ -52,7 +53,7 @@ def find_contacts(assembly: Assembly) -> tuple[Contact, ...]:
     grown = [collision.shape_object(s, X, touch / 2) for s, X in zip(shapes, assembly.X_WB)]
     for a, b in near_pairs(assembly.body_bounds, assembly.owners, touch):
         if isinstance(shapes[a], Box) and isinstance(shapes[b], Box):
-            contact = _box_contact(a, b, grown[a], grown[b], touch)
+            contact = _box_contact(assembly, a, b, grown[a], grown[b])
             if contact is not None:
                 found.append(contact)
         elif collision.collide(grown[a], grown[b]) or collision.distance(grown[a], grown[b]) <= touch:
@@ -68,18 +69,56 @@ def near_pairs(bounds: Array, owners: NDArray[np.int64], margin: float) -> list[
     return [(int(a), int(b)) for a, b in np.argwhere(np.triu(near, 1))]
 
 
-def _box_contact(a: int, b: int, grown_a: object, grown_b: object, touch: float) -> Contact | None:
+def _box_contact(assembly: Assembly, a: int, b: int, grown_a: object, grown_b: object) -> Contact | None:
+    """FCL finds the pair and the normal; the two faces are clipped here, for FCL keeps four of up to eight corners."""
     patch = collision.box_patch(grown_a, grown_b)
-    if patch is None or len(patch[0]) < 3:
+    if patch is None:
         return None
-    points, normal = patch
-    # FCL clipped boxes grown by touch/2: move every corner back along its two edges.
-    following, previous = np.roll(points, -1, axis=0) - points, np.roll(points, 1, axis=0) - points
-    lengths = np.linalg.norm(following, axis=1)
-    if lengths.min() <= 2 * touch:
+    normal = patch[1]
+    faces = [_face_along(assembly, body, sign * normal) for body, sign in ((a, 1.0), (b, -1.0))]
+    first, second = faces
+    if first is None or second is None:
         return None  # an edge or a corner, not a face
-    inward = following / lengths[:, None] + previous / np.roll(lengths, 1)[:, None]
-    return _contact(a, b, points + touch / 2 * inward, normal, touch)
+    (corner_a, u, v, size_a), (corner_b, ub, vb, size_b) = first, second
+    normal = np.cross(u, v)
+    delta = corner_b - corner_a
+    if abs(delta @ normal) > assembly.touch:
+        return None
+    # The other face in this face's frame: an interval along each axis where they are parallel, clipped otherwise.
+    square = np.array([[0, 0], [size_b[0], 0], size_b, [0, size_b[1]]]) @ np.array([ub, vb]) + delta
+    flat = np.stack([square @ u, square @ v], axis=1)
+    if min(np.abs([ub @ u, ub @ v])) <= assembly.tolerances.parallel:
+        low, high = np.maximum(flat.min(axis=0), 0.0), np.minimum(flat.max(axis=0), size_a)
+        if (high - low).min() <= assembly.touch:
+            return None
+        uv = np.array([low, [high[0], low[1]], high, [low[0], high[1]]])
+    else:
+        both = shapely.intersection(shapely.box(0, 0, *size_a), shapely.Polygon(flat))
+        uv = shapely.get_coordinates(both)[:-1]
+        if len(uv) < 3:
+            return None
+    points = corner_a + uv[:, :1] * u + uv[:, 1:] * v
+    return _contact(a, b, points, normal, assembly.touch)
+
+
+def _face_along(assembly: Assembly, body: int, normal: Array) -> tuple[Array, Array, Array, Array] | None:
+    """The face of a box whose outward normal is `normal`: a corner, two unit edges (u x v outward), their lengths."""
+    shape = assembly.bodies[body].shape
+    assert isinstance(shape, Box)
+    X = assembly.X_WB[body]
+    along = X[:3, :3].T @ normal
+    axis = int(np.argmax(np.abs(along)))
+    if np.linalg.norm(np.delete(along, axis)) > 10 * assembly.tolerances.parallel:
+        return None
+    sign = float(np.sign(along[axis]))
+    second, third = (axis + 1) % 3, (axis + 2) % 3
+    if sign < 0:
+        second, third = third, second
+    local = np.zeros(3)
+    local[axis] = sign * shape.size[axis] / 2
+    local[second], local[third] = -shape.size[second] / 2, -shape.size[third] / 2
+    u, v = X[:3, second], X[:3, third]
+    return X[:3, :3] @ local + X[:3, 3], u, v, np.array([shape.size[second], shape.size[third]])
 
 
 def _contact(a: int, b: int, points: Array, normal: Array, touch: float) -> Contact | None:

@@ -18,6 +18,9 @@ Triangles = tuple[Array, NDArray[np.int64]]
 #: A grid finer than this many cells a part is kept as a mesh: boxes would be slower than triangles.
 MAX_CELLS = 4_000
 
+#: Together more cells than this are no puzzle of unit cubes: a cuboid then is one box, any other shape a mesh.
+MAX_UNIT_CUBES = 1_000
+
 #: Where inside a cell (share of its edge) a ray is shot: off the diagonals and edges of the faces it crosses.
 _PROBE = np.array([0.5 + 0.1371, 0.5 + 0.0713, 0.5 + 0.0291])
 
@@ -86,32 +89,60 @@ def _one_body(vertices: Array, faces: NDArray[np.int64]) -> Body:
 
 def _common_grid(meshes: Mapping[str, Triangles], tolerances: Tolerances) -> dict[str, tuple[Body, ...]]:
     """Boxes for the parts that are unions of cubes of one common grid; the others are left out."""
-    frame = None
-    spans: list[Array] = []
-    for vertices, faces in meshes.values():
-        own = _orthogonal_frame(vertices, faces, tolerances)
-        if own is None:
-            continue
-        if frame is None:
-            frame = own
-        if _same_axes(frame, own, tolerances):
-            for axis in (vertices @ frame).T:
-                values = np.sort(axis)
-                gaps = np.diff(values)
-                spans.append(gaps[gaps > 1e-4 * max(float(np.ptp(axis)), 1e-300)])
-    if frame is None or not spans:
+    # Far from the origin a frame's rounding would grow into shifts: all is measured from the middle.
+    middle = np.mean([v.mean(axis=0) for v, _ in meshes.values()], axis=0)
+    near = {name: (v - middle, f) for name, (v, f) in meshes.items()}
+    frames = {name: _orthogonal_frame(v, f, tolerances) for name, (v, f) in near.items()}
+    frame = next((f for f in frames.values() if f is not None), None)
+    if frame is None:
         return {}
+    fitting = [n for n, own in frames.items() if own is not None and _same_axes(frame, own, tolerances)]
+    frame = _mean_frame(frame, [near[n] for n in fitting])
+    local = {name: (near[name][0] @ frame, near[name][1]) for name in fitting}
+    spans = []
+    for vertices, _ in local.values():
+        for axis in vertices.T:
+            gaps = np.diff(np.sort(axis))
+            spans.append(gaps[gaps > 1e-3 * max(float(np.ptp(axis)), 1e-300)])
     pitch = _common_divisor(np.concatenate(spans))
     if pitch is None:
         return {}
-    found = {}
-    for name, (vertices, faces) in meshes.items():
-        own = _orthogonal_frame(vertices, faces, tolerances)
-        if own is not None and _same_axes(frame, own, tolerances):
-            bodies = _cubes(vertices @ frame, faces, frame, pitch)
-            if bodies is not None:
-                found[name] = bodies
+    found: dict[str, tuple[Body, ...]] = {}
+    origin = local[fitting[0]][0].min(axis=0)
+    cells = {name: _cells(vertices, faces, pitch) for name, (vertices, faces) in local.items()}
+    many = sum(len(c) for c in cells.values() if c is not None) > MAX_UNIT_CUBES
+    for name, own_cells in cells.items():
+        if own_cells is None:
+            continue
+        low = local[name][0].min(axis=0)
+        steps = (low - origin) / pitch
+        if np.abs(steps - np.round(steps)).max() < 0.01:
+            low = origin + np.round(steps) * pitch
+        counts = own_cells.max(axis=0) + 1
+        if many and len(own_cells) != counts.prod():
+            continue
+        size = counts * pitch if many else np.full(3, pitch)
+        centres = [counts / 2] if many else own_cells + 0.5
+        bodies = []
+        for centre in centres:
+            X = np.eye(4)
+            X[:3, :3] = frame
+            X[:3, 3] = middle + frame @ (low + centre * pitch)
+            bodies.append(Body(Box(np.asarray(size, dtype=np.float64)), X))
+        found[name] = tuple(bodies)
     return found
+
+
+def _mean_frame(frame: Array, meshes: list[Triangles]) -> Array:
+    """The rotation (3, 3) nearest to all faces of all meshes, each weighed by its area."""
+    triangles = np.concatenate([v[f] for v, f in meshes])
+    area = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    along = area @ frame
+    axis = np.abs(along).argmax(axis=1)
+    columns = [(np.sign(along[axis == k, k])[:, None] * area[axis == k]).sum(axis=0) for k in range(3)]
+    u, _, vt = np.linalg.svd(np.stack([c / np.linalg.norm(c) for c in columns], axis=1))
+    nearest: Array = u @ vt
+    return nearest
 
 
 def _orthogonal_frame(vertices: Array, faces: NDArray[np.int64], tolerances: Tolerances) -> Array | None:
@@ -146,12 +177,12 @@ def _common_divisor(gaps: Array) -> float | None:
         pitch = smallest / parts
         ratio = gaps / pitch
         if np.abs(ratio - np.round(ratio)).max() < 0.01:
-            return pitch
+            return float(gaps.sum() / np.round(ratio).sum())
     return None
 
 
-def _cubes(local: Array, faces: NDArray[np.int64], frame: Array, pitch: float) -> tuple[Body, ...] | None:
-    """The cubes that a mesh, given in the grid's frame, is the union of; None when it is not."""
+def _cells(local: Array, faces: NDArray[np.int64], pitch: float) -> NDArray[np.int64] | None:
+    """The cells, int64 (n, 3) from 0, that a mesh in the grid's frame is the union of; None when it is not."""
     low = local.min(axis=0)
     counts = np.round(np.ptp(local, axis=0) / pitch).astype(int)
     if counts.min() < 1 or counts.prod() > MAX_CELLS:
@@ -172,14 +203,7 @@ def _cubes(local: Array, faces: NDArray[np.int64], frame: Array, pitch: float) -
     c, z = np.nonzero(np.round(winding) > 0)
     if abs(len(c) - signed_volume(t.reshape(-1, 3), np.arange(3 * len(t)).reshape(-1, 3))) > 1e-6:
         return None
-    cells = np.concatenate([columns[c], z[:, None]], axis=1)
-    bodies = []
-    for cell in cells:
-        X = np.eye(4)
-        X[:3, :3] = frame
-        X[:3, 3] = frame @ (low + (cell + 0.5) * pitch)
-        bodies.append(Body(Box(np.full(3, pitch)), X))
-    return tuple(bodies)
+    return np.concatenate([columns[c], z[:, None]], axis=1)
 
 
 def _in_triangles(points: Array, triangles: Array) -> NDArray[np.bool_]:

@@ -19,7 +19,7 @@ from scipy.sparse import csc_array, hstack
 from neurosym.errors import NeurosymError
 from neurosym.geometry.assembly import Box
 from neurosym.geometry.blocking import bits
-from neurosym.geometry.contacts import TABLE, Contact, hull_points, plane_axes
+from neurosym.geometry.contacts import TABLE, Contact, hull_points
 from neurosym.geometry.meshes import signed_volume
 
 if TYPE_CHECKING:
@@ -27,9 +27,10 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-#: Edges of the pyramid that stands for a friction cone. It lies inside the cone: along its faces it allows
-#: cos(45 deg) of the friction.
-CONE_EDGES = 4
+#: Edges of the pyramid that stands for a friction cone. Its section has the area of the cone's: friction is exact to
+#: 2% in every direction, and does not prefer the axes of the world.
+CONE_EDGES = 16
+_CONE_RADIUS = float(np.sqrt(2 * np.pi / (CONE_EDGES * np.sin(2 * np.pi / CONE_EDGES))))
 
 #: Unbalanced force, as a share of the mean part's weight, below which a subset counts as standing.
 BALANCE = 1e-6
@@ -91,13 +92,13 @@ class Stability:
         rows, columns, values, patch_of = [], [], [], []
         width = 0
         for number, p in enumerate(patches):
-            u, v = plane_axes(p.normal)
+            u, v = _patch_axes(p)
             centre = p.points.mean(axis=0)
             points = centre + (p.points - centre) * (1 - self.assembly.tolerances.patch_shrink)
             angles = 2 * np.pi * (np.arange(CONE_EDGES) + 0.5) / CONE_EDGES
             tangents = np.cos(angles)[:, None] * u + np.sin(angles)[:, None] * v
             # The force on a: from b to a, that is against the normal.
-            edges = -p.normal + mu * tangents
+            edges = -p.normal + mu * _CONE_RADIUS * tangents
             forces = np.tile(edges, (len(points), 1))
             at = np.repeat(points, CONE_EDGES, axis=0)
             count = len(forces)
@@ -148,6 +149,15 @@ class Stability:
         speed = np.abs(result.eqlin.marginals.reshape(-1, 6)).max(axis=1)
         moving = sum(1 << parts[i] for i in np.flatnonzero(speed > MOVES * speed.max()))
         return Standing(False, moving)
+
+
+def _patch_axes(patch: Contact) -> tuple[Array, Array]:
+    """Tangents (3,) of a patch along and across its longest edge: the cone turns with the parts, not with the world."""
+    following = np.roll(patch.points, -1, axis=0) - patch.points
+    u = following[np.argmax(np.linalg.norm(following, axis=1))]
+    u = u - (u @ patch.normal) * patch.normal
+    u = u / np.linalg.norm(u)
+    return u, np.cross(patch.normal, u)
 
 
 def merged_patches(assembly: Assembly, contacts: tuple[Contact, ...]) -> tuple[Contact, ...]:

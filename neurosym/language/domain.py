@@ -108,7 +108,7 @@ class Domain:
             objects={kind: tuple(names) for kind, names in objects.items()},
             init=tuple(init),
             goal=tuple(as_literal(g, f"problem {name!r}, goal[{i}]") for i, g in enumerate(goal)),
-            before=tuple((a, b) for a, b in before),
+            before=_as_pairs(before, f"problem {name!r}"),
             interchangeable=tuple(tuple(group) for group in interchangeable),
             name=name or self.name,
             family=family,
@@ -239,6 +239,29 @@ class Problem:
 
     def __repr__(self) -> str:
         return f"Problem({self.name!r}, {len(self.type_of)} objects, {len(self.actions)} actions)"
+
+
+def as_names(given: Any, what: str) -> tuple[str, ...]:
+    """A collection of names, checked; one text is no collection of names, though it is one of letters."""
+    if isinstance(given, str) or not isinstance(given, Iterable):
+        raise InputError(f"Expected {what} as a list of names; got {given!r}.")
+    names = tuple(given)
+    strange = [n for n in names if not isinstance(n, str)]
+    if strange:
+        raise InputError(f"Expected {what} as a list of names; got {strange[0]!r} in it.")
+    return names
+
+
+def _as_pairs(given: Any, place: str) -> tuple[tuple[str, str], ...]:
+    advice = f"In {place}, before: expected pairs of names of actions, for instance [('a', 'b')]"
+    if isinstance(given, str | Mapping) or not isinstance(given, Iterable):
+        raise DefinitionError(f"{advice}; got {given!r}.")
+    pairs = []
+    for pair in given:
+        if isinstance(pair, str) or not isinstance(pair, Sequence) or len(pair) != 2:
+            raise DefinitionError(f"{advice}; got {pair!r} in it.")
+        pairs.append((pair[0], pair[1]))
+    return tuple(pairs)
 
 
 def check_precedence(before: Sequence[tuple[str, str]], names: Iterable[str], place: str) -> None:
