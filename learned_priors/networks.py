@@ -11,7 +11,7 @@ import torch
 from torch import Tensor, nn
 
 from learned_priors.encoders import PictureShape, build_encoder
-from learned_priors.sinkhorn import TOLERANCE, log_sinkhorn
+from learned_priors.sinkhorn import TOLERANCE, log_sinkhorn, scaled_sinkhorn
 from learned_priors.stopping import StoppingNetwork, log_length_of_stops
 from learned_priors.tcn import TemporalDecoder
 from neurosym.errors import CheckpointError
@@ -149,6 +149,9 @@ class OrderNetwork(nn.Module):
         exact = logits.order.to(torch.float64) / self.config.temperature
         if self.config.decoding == "rows":
             return torch.log_softmax(exact, dim=-1)
+        if exact.device.type == "cpu":
+            table = exact.detach().numpy()
+            return torch.from_numpy(scaled_sinkhorn(table, tolerance=TOLERANCE, max_iterations=READ_ITERATIONS))
         return log_sinkhorn(exact, tolerance=TOLERANCE, max_iterations=READ_ITERATIONS)
 
     def log_length(self, logits: Logits) -> Tensor | None:

@@ -13,7 +13,9 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
 if TYPE_CHECKING:
@@ -26,6 +28,10 @@ TOLERANCE = 1e-3
 #: Two nearly tied orders converge as 1/iterations, so the tolerance is met within a few thousand in the worst case
 #: (seen: 3,500 at 30 x 30 and a spread of 1,000).
 MAX_ITERATIONS = 10_000
+
+
+#: Widest spread of logits that `scaled_sinkhorn` takes: its scales reach the exponential of about twice as much.
+SAFE_SPREAD = 150.0
 
 
 def log_sinkhorn(
@@ -80,6 +86,48 @@ def log_sinkhorn(
 def _row_potentials(x: Tensor, v: Tensor, row_mass: Tensor | None) -> Tensor:
     u = torch.logsumexp(x - v, dim=-1, keepdim=True)
     return u if row_mass is None else u - row_mass
+
+
+def scaled_sinkhorn(
+    logits: NDArray[np.float64], *, tolerance: float = TOLERANCE, max_iterations: int = MAX_ITERATIONS
+) -> NDArray[np.float64]:
+    """`log_sinkhorn` for reading: the same iterations and the same answer, without gradients, several times faster.
+
+    It scales the rows and columns of exp(X) (Sinkhorn and Knopp, 1967) instead of adding to logarithms, so that an
+    iteration is two products of a matrix and a vector. Logits of a spread that exp() does not bear go to
+    `log_sinkhorn`.
+
+    Args:
+        logits: float64 (B, T, N) with T <= N; finite.
+    """
+    steps, actions = logits.shape[-2:]
+    spread = np.ptp(logits, axis=(-2, -1)).max(initial=0.0)
+    if not spread < SAFE_SPREAD or steps > actions:
+        exact = log_sinkhorn(torch.from_numpy(logits), tolerance=tolerance, max_iterations=max_iterations)
+        answer: NDArray[np.float64] = exact.numpy()
+        return answer
+    x, mass = logits, np.ones((steps, 1))
+    if steps < actions:
+        x = np.concatenate([logits, np.zeros_like(logits[:, :1])], axis=1)
+        mass = np.append(mass, [[actions - steps]], axis=0)
+    x = x - x.max(axis=2, keepdims=True)
+    table = np.exp(x)
+    turned = np.ascontiguousarray(table.swapaxes(1, 2))
+    rows, columns = np.empty((*x.shape[:2], 1)), np.empty((len(x), actions, 1))
+    going, down = np.arange(len(x)), np.ones((len(x), actions, 1))
+    for k in range(max_iterations + 1):
+        across = mass / (table @ down)
+        sums = turned @ across
+        off = np.abs(down * sums - 1)[..., 0].max(axis=1) > tolerance
+        if k == max_iterations or not off.all():
+            # Matrices that are done are left out of the work; most are, long before the last.
+            rows[going], columns[going] = across, down
+            going, table, turned, sums = going[off], table[off], turned[off], sums[off]
+            if k == max_iterations or not len(going):
+                break
+        down = 1 / sums
+    found: NDArray[np.float64] = (x + np.log(rows) + np.log(columns).swapaxes(1, 2))[:, :steps]
+    return found
 
 
 def gumbel_sinkhorn(

@@ -11,7 +11,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from learned_priors.sinkhorn import TOLERANCE, gumbel_sinkhorn, log_sinkhorn
+from learned_priors.sinkhorn import TOLERANCE, gumbel_sinkhorn, log_sinkhorn, scaled_sinkhorn
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -103,6 +103,22 @@ def test_a_matrix_does_not_depend_on_its_batch() -> None:
     both = log_sinkhorn(torch.stack([easy, hard]))
     torch.testing.assert_close(both[0], log_sinkhorn(easy), atol=1e-6, rtol=0)
     torch.testing.assert_close(both[1], log_sinkhorn(hard), atol=1e-6, rtol=0)
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    shape=st.tuples(st.integers(0, 5), st.integers(1, 9), st.integers(0, 4)),
+    spread=st.sampled_from([0.1, 3.0, 30.0, 140.0, 160.0, 1000.0]),
+    most=st.sampled_from([1, 7, 1000]),
+    seed=st.integers(0, 10**6),
+)
+def test_scaling_gives_what_logarithms_give(shape: tuple[int, int, int], spread: float, most: int, seed: int) -> None:
+    batch, steps, more = shape
+    generator = np.random.default_rng(seed)
+    # Some easy, some hard, so that they stop at different iterations.
+    x = generator.random((batch, steps, steps + more)) * spread * generator.random((batch, 1, 1))
+    exact = log_sinkhorn(torch.from_numpy(x), max_iterations=most).numpy()
+    np.testing.assert_allclose(scaled_sinkhorn(x, max_iterations=most), exact, atol=1e-8)
 
 
 @pytest.mark.parametrize("steps", [3, 4])
