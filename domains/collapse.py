@@ -14,7 +14,6 @@ left decides where every cube lies.
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from dataclasses import dataclass, field
 from functools import cache
 
@@ -166,10 +165,13 @@ def check_cubes(world: Assembly, rule: str) -> None:
         raise AssemblyError(f"Expected cubes on one grid, squarely over one another; some overhang others. {advice}")
 
 
-def check_standing(world: Assembly, rule: str, gone: Collection[str] = ()) -> None:
-    """Refuse a start that floats or falls by itself: under `cubes` a cube, else a piece, with nothing to stand on."""
-    present = (1 << len(world)) - 1 & ~world.mask(gone)
-    if rule == "cubes" and not gone:
+def check_standing(world: Assembly, rule: str) -> None:
+    """Refuse a puzzle that floats or falls by itself: under `cubes` a cube, else a piece, with nothing to stand on.
+
+    The whole is judged: a problem may start from any part of it, also from one that no order of removals leads to.
+    """
+    present = (1 << len(world)) - 1
+    if rule == "cubes":
         # A cube may stand on its own piece: the rule takes the pieces' cubes for independent.
         for cube, z in _settled(world, present).items():
             if world.X_WB[cube, 2, 3] - z > world.smallest_extent / 2:
@@ -178,8 +180,7 @@ def check_standing(world: Assembly, rule: str, gone: Collection[str] = ()) -> No
                     f"Piece {world.names[world.owners[cube]]!r}: its cube ({at}) is floating. Under the rule 'cubes' "
                     "each cube is a body of its own and would fall at once; use collapse='rigid' or 'strict'."
                 )
-    if rule == "cubes":
-        return  # columns are always settled, whatever was taken away
+        return
     # Whoever stands on the table, then whoever stands on those, and so on.
     carriers: dict[int, set[int]] = {}
     for contact in world.contacts():
@@ -205,7 +206,7 @@ def check_standing(world: Assembly, rule: str, gone: Collection[str] = ()) -> No
         if not standing.stands:
             falling = ", ".join(world.in_mask(standing.moving))
             raise AssemblyError(
-                f"Expected a start that stands by itself; {falling} would fall at once. Support it, or raise the "
+                f"Expected a puzzle that stands by itself; {falling} would fall at once. Support it, or raise the "
                 f"friction (it is {world.friction:g})."
             )
 

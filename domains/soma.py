@@ -153,7 +153,7 @@ class SomaFamily(ProblemFamily):
         check_overlaps(assembly)
         if collapse != "rigid":
             check_cubes(assembly, collapse)
-        check_standing(assembly, collapse, gone)
+        check_standing(assembly, collapse)
         # No simulation judges `strict`: what is left over a removed cube need not move.
         simulation = None
         if collapse != "strict":
