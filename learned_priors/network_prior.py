@@ -73,6 +73,11 @@ class NetworkPrior(Prior):
             self._own = self._loaded(Path(weights))
 
     @property
+    def labels(self) -> str:
+        """Which demonstrations this recipe learns from: ``"full"``, with shares of valid orders, or ``"paper"``."""
+        return "full" if self.recipe.train.soft else "paper"
+
+    @property
     def header(self) -> dict[str, Any]:
         """What the weights say of themselves: prior, domain, actions, network, training. Empty before there are any."""
         return dict(self._own.header) if self._own else {}
@@ -182,7 +187,8 @@ class NetworkPrior(Prior):
             train = replace(train, epochs=epochs, least_steps=0)
         views, height, width, colours = demonstrations.pictures.shape[1:]
         n_steps, n_actions = demonstrations.sequences.shape[1], len(demonstrations.actions)
-        head, neurons = self.recipe.head_for(n_steps, n_actions)
+        shortest = int(demonstrations.lengths.min())
+        head, neurons = self.recipe.head_for(all_actions=shortest == n_actions)
         network = NetworkConfig(
             encoder=self.encoder or "small",
             head=head,
@@ -192,7 +198,7 @@ class NetworkPrior(Prior):
             n_actions=n_actions,
             width=neurons,
             temperature=train.temperature if self.recipe.decoding == "sinkhorn" else 1.0,
-            stop=self.recipe.stop if demonstrations.lengths.min() < n_steps else "none",
+            stop=self.recipe.stop if shortest < n_steps else "none",
         )
         fitted = fit(
             demonstrations,

@@ -24,9 +24,6 @@ from neurosym.errors import InputError
 if TYPE_CHECKING:
     from neurosym.demonstrations import Demonstrations
 
-#: Names of priors that end so learn from the paper's demonstrations, all others from the full ones.
-PAPER = "-paper"
-
 
 def demos(
     domain: DomainName,
@@ -81,7 +78,7 @@ def train(
 
         given = Demonstrations.load(demos_file)
     else:
-        recipe = "paper" if prior.endswith(PAPER) else "full"
+        recipe = getattr(learner, "labels", "full")
         given = _demonstrations(domain, "train", split, recipe, pictures, seed, family_options(option))
     checkpoint = out.with_suffix(".checkpoint")
     if checkpoint.exists():
