@@ -77,7 +77,7 @@ class Recipe:
         predicts: "assignment" (the Hungarian algorithm; no action twice) or "independent" (the likeliest of each
             step, which may be the same twice).
         trained_as: recipes that agree in it train the same network and read each other's weights.
-        few_steps: head and width where there are fewer steps than actions; None takes the same as elsewhere.
+        some_actions: head and width for tasks that do not take all of the actions; None takes the same for all.
     """
 
     name: str
@@ -88,11 +88,11 @@ class Recipe:
     stop: Stop = "head"
     predicts: Literal["assignment", "independent"] = "assignment"
     trained_as: str = ""
-    few_steps: tuple[Head, int] | None = None
+    some_actions: tuple[Head, int] | None = None
 
-    def head_for(self, n_steps: int, n_actions: int) -> tuple[Head, int]:
-        """Head and width for T steps of N actions."""
-        return self.few_steps if self.few_steps and n_steps < n_actions else (self.head, self.width)
+    def head_for(self, *, all_actions: bool) -> tuple[Head, int]:
+        """Head and width for tasks that take all of the actions, or only some."""
+        return (self.head, self.width) if all_actions or not self.some_actions else self.some_actions
 
     def __post_init__(self) -> None:
         if not self.trained_as:
@@ -112,7 +112,8 @@ _PAPER: dict[str, Any] = {
     "weight_decay": 0.0,
 }
 # A temporal head names actions by one layer that all steps share. At 6 steps of 98 tiles, 3,000 pictures and 800
-# updates, that reads 96% of letters, the dense head 75%; where all actions are used, it is no better.
+# updates, that reads 96% of letters, the dense head 75%; of 400 hard towers of 2 to 6 blocks it learns 91% of steps,
+# the dense head 82%. Where all actions are used, it is no better.
 _FULL: dict[str, Any] = {"soft": True, "sum_classes": True, "calibrate": True, "epochs": 80, "least_steps": 1500}
 
 _BC = Recipe("bc", "dense", 128, "rows", TrainConfig(loss="rows", **_PAPER), "class", "independent")
@@ -121,7 +122,7 @@ _TCN = Recipe("tcn-paper", "tcn", 16, "rows", TrainConfig(loss="rows", **_PAPER)
 RECIPES = {
     recipe.name: recipe
     for recipe in (
-        Recipe("sinkhorn", "dense", 128, "sinkhorn", TrainConfig(loss="sinkhorn", **_FULL), few_steps=("tcn", 32)),
+        Recipe("sinkhorn", "dense", 128, "sinkhorn", TrainConfig(loss="sinkhorn", **_FULL), some_actions=("tcn", 32)),
         Recipe("tcn", "tcn", 32, "rows", TrainConfig(loss="rows", **_FULL)),
         Recipe(
             "sinkhorn-paper", "dense", 128, "sinkhorn", TrainConfig(loss="gumbel-sinkhorn", **_PAPER), stop="network"
