@@ -27,9 +27,6 @@ from neurosym.registry import load_domain, load_prior
 #: Called with one line about what is going on.
 Say = Callable[[str], None]
 
-#: Priors whose names end so learn from one demonstration a problem, as in the paper.
-PAPER = "-paper"
-
 
 @dataclass(frozen=True)
 class Experiment:
@@ -124,7 +121,7 @@ def reproduce(experiment: Experiment, out: Path, *, workers: int = 1, say: Say =
 def train_cell(experiment: Experiment, cell: Cell, out: Path) -> str:
     """Train one network and keep its weights; a checkpoint lets a killed training go on."""
     family = load_domain(experiment.domain)
-    recipe = "paper" if cell.method.endswith(PAPER) else "full"
+    recipe = _recipe(cell.method)
     given = family.demonstrations(
         "train", split=cell.split, recipe=recipe, style=cell.style, seed=experiment.seed
     )
@@ -153,12 +150,15 @@ def _make_demonstrations(
     family: ProblemFamily, experiment: Experiment, style: str, cells: Sequence[Cell], out: Path, say: Say
 ) -> None:
     """Pictures and labels are kept on disk by the family; making them first keeps them out of the training times."""
-    wanted = {(c.split, c.method.endswith(PAPER)) for c in cells if not c.path(out).exists()}
-    for split, paper in sorted(wanted):
-        say(f"demonstrations: {style} pictures, split {split}, recipe {'paper' if paper else 'full'}")
-        family.demonstrations(
-            "train", split=split, recipe="paper" if paper else "full", style=style, seed=experiment.seed
-        )
+    wanted = {(c.split, _recipe(c.method)) for c in cells if not c.path(out).exists()}
+    for split, recipe in sorted(wanted):
+        say(f"demonstrations: {style} pictures, split {split}, recipe {recipe}")
+        family.demonstrations("train", split=split, recipe=recipe, style=style, seed=experiment.seed)
+
+
+def _recipe(method: str) -> str:
+    """The recipe of demonstrations that a method learns from, as its prior says."""
+    return str(getattr(load_prior(method), "labels", "full"))
 
 
 def _compare(experiment: Experiment, style: str, split: int, out: Path, workers: int) -> Outcome:
