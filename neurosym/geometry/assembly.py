@@ -15,6 +15,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from neurosym.errors import AssemblyError, UnknownNameError
+from neurosym.geometry.shapes import Array as Array
+from neurosym.geometry.shapes import Body as Body
+from neurosym.geometry.shapes import Box as Box
+from neurosym.geometry.shapes import Convex as Convex
+from neurosym.geometry.shapes import Mesh as Mesh
+from neurosym.geometry.shapes import Part as Part
+from neurosym.geometry.shapes import Shape as Shape
+from neurosym.geometry.shapes import boxes_part as boxes_part
 from neurosym.geometry.tolerances import DEFAULT_TOLERANCES, Tolerances
 
 if TYPE_CHECKING:
@@ -22,72 +30,10 @@ if TYPE_CHECKING:
     from neurosym.geometry.contacts import Contact
     from neurosym.geometry.stability import Stability
 
-Array = NDArray[np.float64]
 T = TypeVar("T")
 
 #: Cells farther from the origin than this are refused: lengths would lose their last digits.
 MAX_COORDINATE = 1_000_000
-
-#: Corners of a unit box about the origin, and its twelve triangles with outward normals.
-_CORNERS = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
-_BOX_FACES = np.array(
-    [
-        [0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1],
-        [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3],
-    ]
-)  # fmt: skip
-
-
-@dataclass(frozen=True, eq=False)
-class Box:
-    """A box about its frame's origin. ``size``: float64 (3,), full edge lengths."""
-
-    size: Array
-
-    @property
-    def vertices(self) -> Array:
-        return _CORNERS * self.size
-
-    @property
-    def faces(self) -> NDArray[np.int64]:
-        return _BOX_FACES
-
-
-@dataclass(frozen=True, eq=False)
-class Convex:
-    """A convex body. ``vertices``: float64 (n, 3); ``faces``: int64 (m, 3), outward."""
-
-    vertices: Array
-    faces: NDArray[np.int64]
-
-
-@dataclass(frozen=True, eq=False)
-class Mesh:
-    """A closed triangle mesh, convex or not. ``vertices``: float64 (n, 3); ``faces``: int64 (m, 3), outward."""
-
-    vertices: Array
-    faces: NDArray[np.int64]
-
-
-Shape = Box | Convex | Mesh
-
-
-@dataclass(frozen=True, eq=False)
-class Body:
-    """One shape of a part. ``X_PB``: float64 (4, 4), its pose in the part's frame."""
-
-    shape: Shape
-    X_PB: Array
-
-
-@dataclass(frozen=True, eq=False)
-class Part:
-    """A rigid part: bodies that move together. ``X_WP``: float64 (4, 4); ``density``: mass per unit of volume."""
-
-    name: str
-    bodies: tuple[Body, ...]
-    X_WP: Array
-    density: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -340,16 +286,6 @@ class Assembly:
         state = {k: v for k, v in self.__dict__.items() if k in self.__dataclass_fields__}
         state["_cache"] = {}
         return state
-
-
-def boxes_part(name: str, centres: Array, size: Array, X_WP: Array | None = None, density: float = 1.0) -> Part:
-    """A part of equal boxes: ``centres`` float64 (n, 3) in its frame, ``size`` float64 (3,)."""
-    bodies = []
-    for centre in centres:
-        X = np.eye(4)
-        X[:3, 3] = centre
-        bodies.append(Body(Box(size), X))
-    return Part(name, tuple(bodies), np.eye(4) if X_WP is None else X_WP, density)
 
 
 def _cell(name: str, cell: Sequence[int]) -> tuple[int, int, int]:
