@@ -132,19 +132,14 @@ class ScrabbleFamily(ProblemFamily):
 
         return draw_word(problem.world.word, style_named(style), rng or np.random.default_rng(0))
 
-    def observed(
-        self, problems: Sequence[Problem], *, workers: int = 1, progress: Progress | None = None
-    ) -> list[Problem]:
-        """The problems with their pictures taken, all in one go, from disk where they were taken before."""
+    def take_pictures(
+        self, problems: Sequence[Problem], *, style: str, workers: int = 1, progress: Progress | None = None
+    ) -> NDArray[np.uint8]:
+        """Pictures of many problems, from disk where they were taken before."""
         from domains.scrabble_pictures import cached_pictures
 
-        found: dict[int, Problem] = {}
-        for style in sorted({str(p.details["pictures"]) for p in problems}):
-            chosen = [i for i, p in enumerate(problems) if p.details["pictures"] == style]
-            jobs = [(str(problems[i].details["word"]), int(problems[i].details["seed"])) for i in chosen]
-            views = cached_pictures(jobs, style=style, workers=workers, progress=progress)
-            found |= {i: problems[i].with_pictures(view) for i, view in zip(chosen, views)}
-        return [found[i] for i in range(len(problems))]
+        jobs = [(str(p.details["word"]), int(p.details["seed"])) for p in problems]
+        return cached_pictures(jobs, style=style, workers=workers, progress=progress)
 
     def demonstrations(
         self,

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from domains.collapse import RULES, check_cubes, check_overlaps, check_standing, keeps_standing
-from domains.soma_demonstrations import demonstrate, picture_seed
+from domains.soma_demonstrations import check_seed, demonstrate, picture_seed
 from domains.soma_pieces import LETTERS, Cell, solutions
 from neurosym import predicates
 from neurosym.demonstrations import Demonstrations
@@ -105,7 +105,7 @@ class SomaFamily(ProblemFamily):
             cubes[number],
             collapse=collapse,
             pictures=pictures,
-            seed=picture_seed(seed, int(number)) if isinstance(seed, int) and seed >= 0 else seed,
+            seed=picture_seed(seed, int(number)),
             removed=removed,
             before=before,
             name=f"soma-{number}",
@@ -144,8 +144,7 @@ class SomaFamily(ProblemFamily):
             raise InputError(f"Expected an Assembly; got {assembly!r}. For cells there is problem_from_cells.")
         if pictures not in STYLES:
             raise UnknownNameError("style of pictures", pictures, STYLES)
-        if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
-            raise InputError(f"Expected a seed, an integer of 0 or more; got {seed!r}.")
+        check_seed(seed)
         gone = as_names(removed, "removed")
         for letter in gone:
             if letter not in assembly.names:
@@ -197,19 +196,14 @@ class SomaFamily(ProblemFamily):
         """Four views, top and three sides: uint8 (4, 64, 64, 3)."""
         return render_views(problem.world, style, rng or np.random.default_rng(0))
 
-    def observed(
-        self, problems: Sequence[Problem], *, workers: int = 1, progress: Progress | None = None
-    ) -> list[Problem]:
-        """The problems with their pictures taken, all in one go, from disk where they were taken before."""
+    def take_pictures(
+        self, problems: Sequence[Problem], *, style: str, workers: int = 1, progress: Progress | None = None
+    ) -> NDArray[np.uint8]:
+        """Pictures of many problems, from disk where they were taken before."""
         from neurosym.simulation.picture_cache import cached_pictures
 
-        found: dict[int, Problem] = {}
-        for style in {str(p.details["pictures"]) for p in problems}:
-            chosen = [i for i, p in enumerate(problems) if p.details["pictures"] == style]
-            jobs = [(problems[i].world, problems[i].details["seed"]) for i in chosen]
-            pictures = cached_pictures(jobs, style=style, workers=workers, progress=progress)
-            found |= {i: problems[i].with_pictures(views) for i, views in zip(chosen, pictures)}
-        return [found[i] for i in range(len(problems))]
+        jobs = [(p.world, p.details["seed"]) for p in problems]
+        return cached_pictures(jobs, style=style, workers=workers, progress=progress)
 
     def demonstrations(
         self,

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from domains.soma_pieces import LETTERS, Cell, symmetries, turned
 from neurosym.demonstrations import Demonstrations
-from neurosym.errors import ContractError, UnknownNameError
+from neurosym.errors import ContractError, InputError, UnknownNameError
 from neurosym.family import Progress
 from neurosym.files import replacing
 from neurosym.geometry.assembly import Assembly
@@ -37,8 +37,15 @@ RECIPES = ("full", "paper")
 LABELS_VERSION = 1
 
 
+def check_seed(seed: object) -> None:
+    """Refuse what numpy takes for no seed."""
+    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
+        raise InputError(f"Expected a seed, an integer of 0 or more; got {seed!r}.")
+
+
 def picture_seed(seed: int, number: int, pose: int = 0) -> int:
     """The seed of one picture: of cube `number` in pose number `pose`."""
+    check_seed(seed)
     return int(np.random.SeedSequence([seed, number, pose]).generate_state(1)[0])
 
 

@@ -145,19 +145,12 @@ class TowerFamily(ProblemFamily):
         """One view from the side, uint8 (1, 64, 64, 3), of the tower as it is; `style` says how it is pictured."""
         return take_picture(problem.world, style, rng or np.random.default_rng(0))
 
-    def observed(
-        self, problems: Sequence[Problem], *, workers: int = 1, progress: Progress | None = None
-    ) -> list[Problem]:
-        """The problems with their pictures taken, all in one go, from disk where they were taken before."""
-        found: dict[int, Problem] = {}
-        for style in {str(p.details["pictures"]) for p in problems}:
-            chosen = [i for i, p in enumerate(problems) if p.details["pictures"] == style]
-            seeds = [problems[i].details["seed"] for i in chosen]
-            views = take_pictures(
-                [problems[i].world for i in chosen], seeds, style=style, workers=workers, progress=progress
-            )
-            found |= {i: problems[i].with_pictures(view) for i, view in zip(chosen, views)}
-        return [found[i] for i in range(len(problems))]
+    def take_pictures(
+        self, problems: Sequence[Problem], *, style: str, workers: int = 1, progress: Progress | None = None
+    ) -> NDArray[np.uint8]:
+        """Pictures of many problems, from disk where they were taken before."""
+        worlds, seeds = [p.world for p in problems], [p.details["seed"] for p in problems]
+        return take_pictures(worlds, seeds, style=style, workers=workers, progress=progress)
 
     def demonstrations(
         self,

@@ -53,8 +53,24 @@ class ProblemFamily(ABC):
     def observed(
         self, problems: Sequence[Problem], *, workers: int = 1, progress: Progress | None = None
     ) -> list[Problem]:
-        """The same problems with their pictures taken; a family that can take many at once overrides it."""
-        return list(problems)
+        """The same problems with their pictures taken, all of a style in one go (`take_pictures`)."""
+        found = list(problems)
+        for style in sorted({str(p.details.get("pictures")) for p in problems}):
+            chosen = [i for i, p in enumerate(problems) if str(p.details.get("pictures")) == style]
+            own = [problems[i] for i in chosen]
+            views = self.take_pictures(own, style=style, workers=workers, progress=progress)
+            for i, view in zip(chosen, () if views is None else views):
+                found[i] = problems[i].with_pictures(view)
+        return found
+
+    def take_pictures(
+        self, problems: Sequence[Problem], *, style: str, workers: int = 1, progress: Progress | None = None
+    ) -> NDArray[np.uint8] | None:
+        """Pictures of many problems of one style, uint8 (M, V, H, W, 3): those that each would take by itself.
+
+        None, the default, leaves it to the problems.
+        """
+        return None
 
     def demonstrations(
         self,

@@ -6,8 +6,6 @@ its own orders (`predict`) with those of pictures it never saw. Finished trials 
 
 from __future__ import annotations
 
-import csv
-import io
 import os
 import platform
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -24,7 +22,7 @@ from neurosym.errors import InputError, UnknownNameError
 from neurosym.files import write_text
 from neurosym.journal import Journal, key_of
 from neurosym.registry import load_domain, load_prior
-from neurosym.reproduce import Record
+from neurosym.reproduce import Record, write_records
 
 #: Called with one line about what is going on.
 Say = Callable[[str], None]
@@ -228,45 +226,45 @@ def reproduce_study(
     """Run the trials that are not done yet; write results.csv and report.md into `out`."""
     journal = Journal(out / "trials.jsonl")
     trials = given.trials()
-    keys = {t: key_of({"trial": asdict(t), "epochs": epochs, "version": [__version__, TRIALS_VERSION]}) for t in trials}
+    keys = {t: _key(given, t, epochs) for t in trials}
     missing = [t for t in trials if keys[t] not in journal]
     say(f"{len(trials) - len(missing)} of {len(trials)} trials are done already.")
-    for done, (trial, figures) in enumerate(_run_all(missing, given.name, epochs, workers, given)):
+    for done, (trial, figures) in enumerate(_run_all(missing, given, epochs, workers)):
         journal.add({keys[trial]: figures})
         say(
             f"[{done + 1}/{len(missing)}] {trial.method}, {trial.pictures} pictures, n = {trial.n}, seed {trial.seed}: "
             f"{figures['whole_sequence']:.2f} whole, {figures['per_step']:.2f} a step"
         )
-    journal = Journal(out / "trials.jsonl")
     records = [
         Record(t.study, t.pictures, t.method, t.n, t.seed, metric, value)
         for t in trials
         for metric, value in sorted(journal[keys[t]].items())
     ]
-    text = io.StringIO()
-    writer = csv.DictWriter(text, list(asdict(records[0])), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(asdict(r) for r in records)
-    write_text(out / "results.csv", text.getvalue())
+    write_records(records, out / "results.csv")
     write_text(out / "report.md", report(given, records))
     return records
 
 
+def _key(given: Study, trial: Trial, epochs: int | None) -> str:
+    """A digest of all that decides a trial."""
+    data = [given.domain, given.part, given.options(trial.n), given.test(trial.n)]
+    return key_of({"trial": asdict(trial), "data": data, "epochs": epochs, "version": [__version__, TRIALS_VERSION]})
+
+
 def _run_all(
-    missing: Sequence[Trial], name: str, epochs: int | None, workers: int, given: Study
+    missing: Sequence[Trial], given: Study, epochs: int | None, workers: int
 ) -> Iterable[tuple[Trial, dict[str, float]]]:
     if workers <= 1 or len(missing) <= 1:
         return ((t, run_trial(t, given, epochs)) for t in missing)
     from joblib import Parallel, delayed
 
-    # A study holds functions, which do not travel to every kind of worker: it is looked up again by its name.
-    pool = Parallel(n_jobs=workers, return_as="generator_unordered")
-    finished: Iterable[tuple[Trial, dict[str, float]]] = pool(delayed(_named_trial)(t, name, epochs) for t in missing)
+    def run(trial: Trial) -> tuple[Trial, dict[str, float]]:
+        return trial, run_trial(trial, given, epochs)
+
+    finished: Iterable[tuple[Trial, dict[str, float]]] = Parallel(n_jobs=workers, return_as="generator_unordered")(
+        delayed(run)(t) for t in missing
+    )
     return finished
-
-
-def _named_trial(trial: Trial, name: str, epochs: int | None) -> tuple[Trial, dict[str, float]]:
-    return trial, run_trial(trial, study(name), epochs)
 
 
 def report(given: Study, records: Sequence[Record]) -> str:

@@ -205,11 +205,7 @@ def _records(experiment: Experiment, outcome: Outcome, style: str, split: int, o
 def _write(
     experiment: Experiment, records: Sequence[Record], outcomes: dict[tuple[str, int], Outcome], out: Path
 ) -> None:
-    text = io.StringIO()
-    writer = csv.DictWriter(text, list(asdict(records[0])), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(asdict(r) for r in records)
-    write_text(out / "results.csv", text.getvalue())
+    write_records(records, out / "results.csv")
     write_text(out / "report.md", report(experiment, records))
     from neurosym.plotting import iterations_figure, save
 
@@ -219,6 +215,15 @@ def _write(
         numbers = tuple(n for o in own for n in o.comparison.numbers)
         pooled = Outcome(replace(own[0].comparison, numbers=numbers), runs)
         save(iterations_figure(pooled), out / f"iterations-{style}.png")
+
+
+def write_records(records: Sequence[Record], path: Path) -> None:
+    """Write results.csv, a line a number, whole or not at all."""
+    text = io.StringIO()
+    writer = csv.DictWriter(text, list(Record.__dataclass_fields__), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(asdict(r) for r in records)
+    write_text(path, text.getvalue())
 
 
 def report(experiment: Experiment, records: Sequence[Record]) -> str:

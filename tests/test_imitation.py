@@ -68,3 +68,24 @@ def test_every_study_is_made_of_what_is_there():
         assert set(given.methods) <= set(ns.prior_names())
     with pytest.raises(ns.UnknownNameError, match="study"):
         study("towers")
+
+
+def test_trials_in_other_processes_run_the_study_that_was_given(tmp_path):
+    """Not the registered one of its name: here it trains on 6 towers and is tested on 5."""
+    given = replace(
+        TINY,
+        options=lambda n: {"variant": "colours", "count": 6},
+        test=lambda n: {"variant": "colours", "count": 5},
+    )
+    here = reproduce_study(given, tmp_path / "here", epochs=1)
+    there = reproduce_study(given, tmp_path / "there", epochs=1, workers=2)
+
+    def timeless(records):
+        return [r for r in records if r.metric != "training_seconds"]
+
+    assert timeless(here) == timeless(there)
+    # Another test set is another trial: the journal must not answer for it.
+    larger = replace(given, test=lambda n: {"variant": "colours", "count": 7})
+    other = reproduce_study(larger, tmp_path / "here", epochs=1)
+    shares = {r.value for r in other if r.metric == "per_step"}
+    assert all((7 * 6 * v) == pytest.approx(round(7 * 6 * v)) for v in shares)
