@@ -7,7 +7,7 @@ Frames are named as Drake does: ``X_WP`` is the pose of part P in the world W, a
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
@@ -45,12 +45,16 @@ class Assembly:
         table: height of the table's plane (z, world), or None: under the lowest point.
         friction: Coulomb's coefficient between any two faces (no unit).
         tolerances: how exact the geometry is taken to be.
+        fixed: names of parts that never move and need no support, such as springers and foundations.
+        units: what a length of 1 is ("m", "mm", ...), for people and files; None when nobody said. Nothing is converted.
     """
 
     parts: tuple[Part, ...]
     table: float | None = None
     friction: float = 0.5
     tolerances: Tolerances = DEFAULT_TOLERANCES
+    fixed: tuple[str, ...] = ()
+    units: str | None = None
     _cache: dict[str, Any] = field(default_factory=dict, repr=False)
     _keep_answers: bool = field(default=True, repr=False)
 
@@ -61,6 +65,9 @@ class Assembly:
         twice = sorted({n for n in names if names.count(n) > 1})
         if twice:
             raise AssemblyError(f"Expected each part name once; got twice: {', '.join(twice)}. Rename one.")
+        for name in self.fixed:
+            if name not in names:
+                raise UnknownNameError("fixed part", name, names)
         for part in self.parts:
             if not part.bodies:
                 raise AssemblyError(f"Expected part {part.name!r} to have at least one body; it is empty.")
@@ -143,11 +150,15 @@ class Assembly:
             if not np.isclose(motion[2, 2], 1.0):
                 raise AssemblyError("Expected an upright motion: the table of this assembly was given by its height.")
             table = float(table + motion[2, 3])
-        return Assembly(parts, table, self.friction, self.tolerances)
+        return replace(self, parts=parts, table=table, _cache={})
+
+    def with_fixed(self, names: Iterable[str]) -> Assembly:
+        """The assembly with these parts fixed, and no others."""
+        return replace(self, fixed=tuple(names), _cache={})
 
     def afresh(self) -> Assembly:
         """The same assembly with nothing remembered and nothing tabulated: every question is asked anew."""
-        return Assembly(self.parts, self.table, self.friction, self.tolerances, {}, False)
+        return replace(self, _cache={}, _keep_answers=False)
 
     # -- asking -----------------------------------------------------------------------------------------------
 
@@ -249,6 +260,11 @@ class Assembly:
     def mask(self, names: Iterable[str]) -> int:
         """A bitset of parts."""
         return sum(1 << self.index[n] for n in names)
+
+    @cached_property
+    def fixed_mask(self) -> int:
+        """A bitset of the fixed parts."""
+        return self.mask(self.fixed)
 
     def in_mask(self, mask: int) -> tuple[str, ...]:
         """Names of the parts in a bitset."""
