@@ -46,7 +46,7 @@ class Assembly:
         friction: Coulomb's coefficient between any two faces (no unit).
         tolerances: how exact the geometry is taken to be.
         fixed: names of parts that never move and need no support, such as springers and foundations.
-        units: what a length of 1 is ("m", "mm", ...), for people and files; None when nobody said. Nothing is converted.
+        units: what a length of 1 is ("m", "mm", ...), for people and files; None when nobody said.
     """
 
     parts: tuple[Part, ...]
