@@ -1,0 +1,39 @@
+"""What a study says: a page of Markdown, our figures beside the paper's."""
+
+from __future__ import annotations
+
+import os
+import platform
+from collections.abc import Sequence
+
+import numpy as np
+
+from neurosym import __version__
+from neurosym.reproduce import Record
+from neurosym.studies import Study
+
+
+def report(given: Study, records: Sequence[Record]) -> str:
+    """A page of Markdown: means over seeds with their deviation, the paper's figures beside them."""
+    metrics = ["whole_sequence", "whole_sequence_seen", "whole_sequence_unseen", "per_step", "per_step_unseen"]
+    metrics += ["stop_accuracy", "re_use", "training_seconds"]
+    said = f"Mean over {given.seeds} seeds ± deviation; a sequence is seen when it, colours or letters, was trained on."
+    lines = [f"# {given.name}", "", said]
+    for style in given.pictures:
+        head = [given.what, "method", *(m.replace("_", " ") for m in metrics), "paper"]
+        lines += ["", f"## {style} pictures", "", f"| {' | '.join(head)} |", "|" + "---|" * len(head)]
+        for n in given.sizes:
+            for method in given.methods:
+                own = [r for r in records if (r.pictures, r.method, r.n) == (style, method, n)]
+                row = [_mean([r.value for r in own if r.metric == m]) for m in metrics]
+                paper = (given.published or {}).get(method, {})
+                beside = ", ".join(f"{m.replace('_', ' ')} {v:.2f}" for m, v in paper.items())
+                lines.append(f"| {n} | {method} | {' | '.join(row)} | {beside} |")
+    machine = f"Python {platform.python_version()}, {os.cpu_count()} processors"
+    return "\n".join([*lines, "", f"neurosym {__version__}, {machine}; seeds 0 to {given.seeds - 1}.", ""])
+
+
+def _mean(values: Sequence[float]) -> str:
+    if not values:
+        return ""
+    return f"{np.mean(values):.2f}" + (f" ± {np.std(values):.2f}" if len(values) > 1 else "")
