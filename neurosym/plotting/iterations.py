@@ -1,26 +1,19 @@
-"""Figures. They are returned, never shown, and touch no global state of matplotlib: the caller saves or shows them."""
+"""How many iterations planners need with each prior."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from neurosym.benchmark import NO_PRIOR, Outcome, Run
-from neurosym.files import replacing
+from neurosym.plotting.style import COLOURS, COLUMN
 from neurosym.reporting import published
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-#: Okabe and Ito's colours, told apart by people with any of the common colour deficiencies. One a prior, in order.
-COLOURS = ("#7f7f7f", "#E69F00", "#56B4E9", "#D55E00", "#0072B2", "#009E73", "#CC79A7", "#000000")
-
-#: Width of one column of a two-column page (inches).
-COLUMN = 3.5
 
 #: Counts above this share one bar: the tail of a planner without a prior would squeeze all others.
 LAST_BAR = 12
@@ -96,10 +89,3 @@ def _legend(figure: Figure, with_paper: bool) -> None:
     if with_paper:
         handles.append(Line2D([], [], ls="", marker="D", ms=4, mfc="white", mec="black", label="mean in the paper"))
     figure.legend(handles=handles, loc="outside lower center", ncols=3, fontsize=7, frameon=False, handletextpad=0.4)
-
-
-def save(figure: Figure, path: str | Path, *, dpi: int = 200) -> Path:
-    """Write a figure to a file, whole or not at all; its folder is made. Returns the path."""
-    with replacing(path) as temporary:
-        figure.savefig(temporary, dpi=dpi)
-    return Path(path)
