@@ -5,16 +5,25 @@ from __future__ import annotations
 import os
 import platform
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
 from neurosym import __version__
-from neurosym.reproduce import Record
-from neurosym.studies import Study
+from neurosym.files import write_text
+from neurosym.reproduce import write_records
+from neurosym.study_results import Results
 
 
-def report(given: Study, records: Sequence[Record]) -> str:
+def write_results(results: Results, out: Path) -> None:
+    """Write results.csv and report.md into `out`."""
+    write_records(results.records, out / "results.csv")
+    write_text(out / "report.md", report(results))
+
+
+def report(results: Results) -> str:
     """A page of Markdown: means over seeds with their deviation, the paper's figures beside them."""
+    given = results.study
     metrics = ["whole_sequence", "whole_sequence_seen", "whole_sequence_unseen", "per_step", "per_step_unseen"]
     metrics += ["stop_accuracy", "re_use", "training_seconds"]
     said = f"Mean over {given.seeds} seeds ± deviation; a sequence is seen when it, colours or letters, was trained on."
@@ -23,9 +32,8 @@ def report(given: Study, records: Sequence[Record]) -> str:
         head = [given.what, "method", *(m.replace("_", " ") for m in metrics), "paper"]
         lines += ["", f"## {style} pictures", "", f"| {' | '.join(head)} |", "|" + "---|" * len(head)]
         for n in given.sizes:
-            for method in given.methods:
-                own = [r for r in records if (r.pictures, r.method, r.n) == (style, method, n)]
-                row = [_mean([r.value for r in own if r.metric == m]) for m in metrics]
+            for method in (*given.methods, *given.baselines):
+                row = [_mean(results.values(style, method, n, m)) for m in metrics]
                 paper = (given.published or {}).get(method, {})
                 beside = ", ".join(f"{m.replace('_', ' ')} {v:.2f}" for m, v in paper.items())
                 lines.append(f"| {n} | {method} | {' | '.join(row)} | {beside} |")

@@ -36,6 +36,10 @@ class Study:
         published: method -> the paper's figures, by metric.
         pictures: styles.
         seeds: how often; each seed is another split and another training.
+        baselines: names in `neurosym.order_baselines.BASELINES`; calculated for each style, n and seed.
+        ours: which of the methods is not the paper's.
+        about: what is asked, in a sentence.
+        figures: kinds of figures, see `neurosym.study_figures`.
     """
 
     name: str
@@ -49,13 +53,17 @@ class Study:
     published: Mapping[str, Mapping[str, float]] | None = None
     pictures: tuple[str, ...] = ("hard",)
     seeds: int = 3
+    baselines: tuple[str, ...] = ("memoriser", "blind")
+    ours: str = "sinkhorn"
+    about: str = ""
+    figures: tuple[str, ...] = ()
 
     def trials(self) -> list[Trial]:
         return [
             Trial(self.name, style, method, n, seed)
             for style in self.pictures
             for n in self.sizes
-            for method in self.methods
+            for method in (*self.methods, *self.baselines)
             for seed in range(self.seeds)
         ]
 

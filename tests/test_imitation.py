@@ -10,9 +10,12 @@ import pytest
 
 import neurosym as ns
 from neurosym import imitation
-from neurosym.imitation import compare_orders, reproduce_study, study, study_names
+from neurosym.imitation import reproduce_study, study, study_names
+from neurosym.measures import compare_orders
 
-TINY = replace(study("variable"), methods=("tcn-paper+hungarian", "sinkhorn"), sizes=(12,), seeds=1)
+TINY = replace(
+    study("variable"), methods=("tcn-paper+hungarian", "sinkhorn"), baselines=("blind",), sizes=(12,), seeds=1
+)
 
 
 def demonstrations(sequences):
@@ -51,11 +54,11 @@ def test_a_killed_study_goes_on(tmp_path, monkeypatch):
         reproduce_study(given, tmp_path, epochs=1)
     monkeypatch.setattr(imitation, "run_trial", lambda t, *rest: done.append(t.method) or really(t, *rest))
     reproduce_study(given, tmp_path, epochs=1)
-    assert done == ["tcn-paper+hungarian", "sinkhorn"]
+    assert done == ["tcn-paper+hungarian", "sinkhorn", "blind"]
     with open(tmp_path / "results.csv", newline="") as file:
         lines = list(csv.DictReader(file))
     assert list(lines[0]) == ["experiment", "pictures", "method", "n", "seed", "metric", "value"]
-    assert {line["method"] for line in lines} == set(TINY.methods)
+    assert {line["method"] for line in lines} == {*TINY.methods, "blind"}
     shares = {line["metric"]: float(line["value"]) for line in lines if line["method"] == "sinkhorn"}
     assert shares["seen_share"] + shares["unseen_share"] == pytest.approx(1)
     assert "| 12 | sinkhorn |" in (tmp_path / "report.md").read_text()
@@ -80,12 +83,12 @@ def test_trials_in_other_processes_run_the_study_that_was_given(tmp_path):
     here = reproduce_study(given, tmp_path / "here", epochs=1)
     there = reproduce_study(given, tmp_path / "there", epochs=1, workers=2)
 
-    def timeless(records):
-        return [r for r in records if r.metric != "training_seconds"]
+    def timeless(results):
+        return [r for r in results.records if r.metric != "training_seconds"]
 
     assert timeless(here) == timeless(there)
     # Another test set is another trial: the journal must not answer for it.
     larger = replace(given, test=lambda n: {"variant": "colours", "count": 7})
     other = reproduce_study(larger, tmp_path / "here", epochs=1)
-    shares = {r.value for r in other if r.metric == "per_step"}
+    shares = {r.value for r in other.records if r.metric == "per_step"}
     assert all((7 * 6 * v) == pytest.approx(round(7 * 6 * v)) for v in shares)

@@ -55,7 +55,7 @@ def _study(
 
     given = study(name)
     given = replace(given, seeds=seeds or given.seeds, methods=tuple(prior or given.methods))
-    return report(given, reproduce_study(given, folder, workers=workers, epochs=epochs, say=say))
+    return report(reproduce_study(given, folder, workers=workers, epochs=epochs, say=say))
 
 
 def _planning(
