@@ -100,7 +100,7 @@ def plan(
     answer = {
         **_header(domain, problem, number, options),
         **settings,
-        "budget": vars(budget),
+        "budget": budget.limits,
         "seed": seed,
         **_result(results[0]),
     }
