@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from domains import tower_rules as rules
-from domains.tower_blocks import Block, ReferenceTower
+from domains.tower_blocks import COLOURS, Block, ReferenceTower
 from domains.tower_demonstrations import demonstrate
 from domains.tower_pictures import draw_offsets, picture_seed, setting_named, take_picture, take_pictures
 from domains.tower_variants import TALLEST, VARIANTS, blocks_of, sequences, split_numbers, towers
@@ -23,6 +23,7 @@ from neurosym.demonstrations import Demonstrations
 from neurosym.errors import AssemblyError, InputError, UnknownNameError
 from neurosym.family import ProblemFamily, Progress
 from neurosym.language import Problem
+from neurosym.motions import Staging, building
 
 
 class TowerFamily(ProblemFamily):
@@ -107,6 +108,10 @@ class TowerFamily(ProblemFamily):
         def observe() -> NDArray[np.uint8]:
             return take_picture(tower, style, np.random.default_rng(seed))
 
+        def stage(plan: Sequence[str], how: Sequence[Any] = ()) -> Staging:
+            order = (*standing, *plan)
+            return building(tower.built(order), standing, plan, {n: COLOURS[tower.kinds[n][0]] for n in order})
+
         return self.domain.problem(
             world=tower,
             objects={rules.block: tower.names},
@@ -117,6 +122,7 @@ class TowerFamily(ProblemFamily):
             name=name,
             family=self.name,
             observe=observe,
+            stage=stage,
             details={"pictures": style, "seed": seed, "colours": tower.colours},
         )
 

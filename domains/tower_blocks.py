@@ -141,6 +141,26 @@ class ReferenceTower:
         answer = self.assembly.stability().standing((1 << height) - 1)
         return () if answer.stands else tuple(i for i in range(height) if answer.moving >> i & 1)
 
+    def built(self, order: Sequence[str]) -> Assembly:
+        """The tower that these blocks make, from the bottom up: parts on the levels' places, named after the blocks.
+
+        Raises:
+            UnknownNameError: no such block.
+            AssemblyError: more blocks than levels, or none.
+        """
+        if not 0 < len(order) <= len(self.levels):
+            raise AssemblyError(f"Expected 1 to {len(self.levels)} blocks; got {len(order)}.")
+        parts, top = [], 0.0
+        for name, (x, y) in zip(order, self.offsets.tolist()):
+            if name not in self.kinds:
+                raise UnknownNameError("block", name, self.names)
+            size = self.kinds[name][1]
+            X = np.eye(4)
+            X[:3, 3] = x, y, top + size[2] / 2
+            parts.append(boxes_part(name, np.zeros((1, 3)), np.array(size), X))
+            top += size[2]
+        return Assembly(tuple(parts), table=0.0)
+
     def afresh(self) -> ReferenceTower:
         """The same tower with nothing remembered: every question is asked anew."""
         return replace(self, _afresh=True)

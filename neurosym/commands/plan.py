@@ -28,13 +28,11 @@ from neurosym.commands.common import (
 from neurosym.errors import InputError
 from neurosym.family import ProblemFamily
 from neurosym.geometry.directions import in_words
+from neurosym.plan_files import SCHEMA
 
 if TYPE_CHECKING:
     from neurosym.language.domain import Problem
     from neurosym.planner import PlanResult
-
-#: Of the file that --out writes. Raise it when a reader of the old one would go wrong.
-SCHEMA = 1
 
 #: Refusals shown at the end of a search that found nothing; --out keeps all.
 LAST_REFUSALS = 12
@@ -99,6 +97,8 @@ def plan(
         results = [solve(problem, rng=np.random.default_rng(seed), **settings)]
     answer = {
         **_header(domain, problem, number, options),
+        # Pieces of the user's own travel with their plan, so that it can be shown and replayed.
+        **({} if cells is None else {"cells": _cells(cells)}),
         **settings,
         "budget": budget.limits,
         "seed": seed,
@@ -135,14 +135,18 @@ def _problem(family: ProblemFamily, number: int | None, cells: Path | None, opti
     make = getattr(family, "problem_from_cells", None)
     if make is None:
         raise InputError(f"Expected a domain of polycube puzzles (soma) for --cells; {family.name!r} is none.")
-    try:
-        given = json.loads(cells.read_text(encoding="utf-8"), object_pairs_hook=_each_once)
-    except ValueError as error:
-        raise InputError(f'Expected JSON {{"name": [[x, y, z], ...]}} in {cells}; got: {error}.') from None
-    if not isinstance(given, dict) or not all(isinstance(own, list) for own in given.values()):
-        raise InputError(f'Expected JSON {{"name": [[x, y, z], ...]}} in {cells}; got something else.')
-    problem: Problem = make(given, **options)
+    problem: Problem = make(_cells(cells), **options)
     return problem
+
+
+def _cells(path: Path) -> dict[str, Any]:
+    try:
+        given = json.loads(path.read_text(encoding="utf-8"), object_pairs_hook=_each_once)
+    except ValueError as error:
+        raise InputError(f'Expected JSON {{"name": [[x, y, z], ...]}} in {path}; got: {error}.') from None
+    if not isinstance(given, dict) or not all(isinstance(own, list) for own in given.values()):
+        raise InputError(f'Expected JSON {{"name": [[x, y, z], ...]}} in {path}; got something else.')
+    return given
 
 
 def _pair(text: str) -> tuple[str, str]:

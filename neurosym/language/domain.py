@@ -20,6 +20,7 @@ from neurosym.language.terms import Atom, Condition, Derived, Fluent, Literal, T
 
 if TYPE_CHECKING:
     from neurosym.language.grounding import GroundProblem
+    from neurosym.motions import Staging
 
 #: More ground actions than this are refused: the definition wants a static fluent that narrows its parameters.
 MAX_GROUND_ACTIONS = 1_000_000
@@ -81,6 +82,7 @@ class Domain:
         family: str | None = None,
         observe: Callable[[], NDArray[np.uint8]] | None = None,
         simulation: Simulation | None = None,
+        stage: Callable[[Sequence[str], Sequence[Any]], Staging] | None = None,
         details: Mapping[str, Any] | None = None,
     ) -> Problem:
         """A problem of this domain, checked.
@@ -96,6 +98,8 @@ class Domain:
             family: the name of the problem family, by which priors find their weights.
             observe: gives the pictures, uint8 (V, H, W, 3), when first asked for.
             simulation: how a physics oracle would judge it.
+            stage: what a plan (names of actions, and `PlanResult.how`) does to parts in space, for pictures and
+                replays; None: each action takes away the part that `simulation` names.
             details: whatever the family wants to remember.
 
         Raises:
@@ -114,6 +118,7 @@ class Domain:
             family=family,
             observe=observe,
             simulation=simulation,
+            stage=stage,
             details=dict(details or {}),
         )
         problem.ground()
@@ -138,6 +143,7 @@ class Problem:
     family: str | None = None
     observe: Callable[[], NDArray[np.uint8]] | None = None
     simulation: Simulation | None = None
+    stage: Callable[[Sequence[str], Sequence[Any]], Staging] | None = None
     details: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
