@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from neurosym.errors import AssemblyError, UnknownNameError
+from neurosym.geometry.notes import Note
 from neurosym.geometry.shapes import Array as Array
 from neurosym.geometry.shapes import Body as Body
 from neurosym.geometry.shapes import Box as Box
@@ -26,11 +27,17 @@ from neurosym.geometry.shapes import boxes_part as boxes_part
 from neurosym.geometry.tolerances import DEFAULT_TOLERANCES, Tolerances
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from neurosym.geometry.blocking import BlockingGraph
     from neurosym.geometry.contacts import Contact
+    from neurosym.geometry.directions import Directions
     from neurosym.geometry.stability import Stability
 
 T = TypeVar("T")
+
+#: The height of a table that is not there: infinitely far down, where nothing touches it.
+NO_TABLE = float("-inf")
 
 #: Cells farther from the origin than this are refused: lengths would lose their last digits.
 MAX_COORDINATE = 1_000_000
@@ -42,7 +49,7 @@ class Assembly:
 
     Attributes:
         parts: the parts, each with a name of its own.
-        table: height of the table's plane (z, world), or None: under the lowest point.
+        table: height of the table's plane (z, world); None: under the lowest point; `NO_TABLE`: there is none.
         friction: Coulomb's coefficient between any two faces (no unit).
         tolerances: how exact the geometry is taken to be.
         fixed: names of parts that never move and need no support, such as springers and foundations.
@@ -55,6 +62,7 @@ class Assembly:
     tolerances: Tolerances = DEFAULT_TOLERANCES
     fixed: tuple[str, ...] = ()
     units: str | None = None
+    notes: tuple[Note, ...] = ()
     _cache: dict[str, Any] = field(default_factory=dict, repr=False)
     _keep_answers: bool = field(default=True, repr=False)
 
@@ -138,6 +146,27 @@ class Assembly:
             raise AssemblyError(f"Expected parts as {{name: mesh}}; got {type(meshes).__name__}.")
         return cls(parts_from_meshes(meshes, tolerances), table, friction, tolerances)
 
+    @classmethod
+    def load(
+        cls,
+        path: str | Path,
+        *,
+        units: str | None = None,
+        fixed: Iterable[str] = (),
+        tolerances: Tolerances | None = None,
+        friction: float | None = None,
+    ) -> Assembly:
+        """An assembly from a folder of meshes or from a file."""
+        from neurosym.geometry.loading import load
+
+        return load(path, units=units, fixed=fixed, tolerances=tolerances, friction=friction)
+
+    def save(self, path: str | Path) -> None:
+        """Write the assembly as JSON, whole or not at all; `load` gives the same one back, number by number."""
+        from neurosym.geometry.formats.assembly_json import write
+
+        write(self, path)
+
     def transformed(self, X: ArrayLike) -> Assembly:
         """The assembly moved by a rigid motion of the world, float64 (4, 4).
 
@@ -146,7 +175,7 @@ class Assembly:
         motion = _rigid(X)
         parts = tuple(Part(p.name, p.bodies, motion @ p.X_WP, p.density) for p in self.parts)
         table = self.table
-        if table is not None:
+        if table is not None and table != NO_TABLE:
             if not np.isclose(motion[2, 2], 1.0):
                 raise AssemblyError("Expected an upright motion: the table of this assembly was given by its height.")
             table = float(table + motion[2, 3])
@@ -155,6 +184,10 @@ class Assembly:
     def with_fixed(self, names: Iterable[str]) -> Assembly:
         """The assembly with these parts fixed, and no others."""
         return replace(self, fixed=tuple(names), _cache={})
+
+    def with_table(self, height: float | None) -> Assembly:
+        """The assembly with the table at this height, under its lowest point (None), or nowhere (`NO_TABLE`)."""
+        return replace(self, table=height, _cache={})
 
     def afresh(self) -> Assembly:
         """The same assembly with nothing remembered and nothing tabulated: every question is asked anew."""
@@ -228,8 +261,13 @@ class Assembly:
 
     @property
     def ground(self) -> float:
-        """Height of the table (z, world): as given, else the lowest point."""
+        """Height of the table (z, world): as given, else the lowest point; `NO_TABLE` where there is none."""
         return float(self.bounds[0, 2]) if self.table is None else self.table
+
+    @property
+    def has_table(self) -> bool:
+        """Whether there is a table at all."""
+        return self.table != NO_TABLE
 
     @cached_property
     def smallest_extent(self) -> float:
@@ -278,11 +316,18 @@ class Assembly:
 
         return self.remember("contacts", lambda: find_contacts(self))
 
-    def blocking(self, directions: ArrayLike | None = None) -> BlockingGraph:
-        """What stands in the way of what, per direction, float64 (k, 3); default `axes`."""
-        from neurosym.geometry.blocking import BlockingGraph
+    def contact_directions(self) -> Array:
+        """float64 (k, 3): where the contacts let parts slide or lift off, those of most parts first."""
+        from neurosym.geometry.directions import contact_directions
 
-        chosen = self.axes if directions is None else np.atleast_2d(np.asarray(directions, dtype=np.float64))
+        return self.remember("contact directions", lambda: contact_directions(self))
+
+    def blocking(self, directions: Directions = None) -> BlockingGraph:
+        """What stands in the way of what, per direction (see `directions_for`); default `axes`."""
+        from neurosym.geometry.blocking import BlockingGraph
+        from neurosym.geometry.directions import directions_for
+
+        chosen = directions_for(self, directions)
         return self.remember(f"blocking {chosen.tobytes().hex()}", lambda: BlockingGraph(self, chosen))
 
     def stability(self) -> Stability:

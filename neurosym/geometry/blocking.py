@@ -13,7 +13,6 @@ import networkx as nx
 import numpy as np
 from numpy.typing import NDArray
 
-from neurosym.errors import InputError
 from neurosym.geometry import collision
 from neurosym.geometry.assembly import Box
 from neurosym.geometry.contacts import plane_axes
@@ -38,14 +37,11 @@ class BlockingGraph:
     """
 
     def __init__(self, assembly: Assembly, directions: Array) -> None:
-        lengths = np.linalg.norm(directions, axis=1)
-        if directions.ndim != 2 or directions.shape[1] != 3 or not np.isfinite(lengths).all() or not lengths.all():
-            raise InputError(f"Expected directions as non-zero vectors of shape (k, 3); got {directions.tolist()}.")
         self.assembly = assembly
-        self.directions = directions / lengths[:, None]
+        self.directions = directions
         self.vectors = [tuple(map(float, d)) for d in self.directions]
         self.names = assembly.names
-        self.into_table = self.directions[:, 2] < -assembly.tolerances.parallel
+        self.into_table = (self.directions[:, 2] < -assembly.tolerances.parallel) & assembly.has_table
         self.queries = 0
         self.by_body = [self._bodies_along(d) for d in self.directions]
         owner_bits = [1 << int(o) for o in assembly.owners]
@@ -70,12 +66,62 @@ class BlockingGraph:
         return hit & among & ~group
 
     def free_directions(self, part: int, among: int, *, table: bool = True) -> list[int]:
-        """Numbers of the directions along which a part can leave the parts in `among` (and the table)."""
+        """Numbers of the directions along which a part can leave the parts in `among` (and the table).
+
+        A fixed part has none.
+        """
+        if self.assembly.fixed_mask >> part & 1:
+            return []
         return [
             d
             for d in range(len(self.directions))
             if not (table and self.into_table[d]) and not self.blockers(part, d, among)
         ]
+
+    def carried(self, group: int, direction: int, among: int) -> int:
+        """Bitset of all parts in `among` that move when the parts in `group` move along a direction, `group` too.
+
+        What is hit is pushed along, and hits in turn: the closure of `group` under blocking.
+        """
+        moving = waiting = group & among
+        while waiting:
+            hit = 0
+            for part in bits(waiting):
+                hit |= self.by_part[direction][part]
+            waiting = hit & among & ~moving
+            moving |= waiting
+        return moving
+
+    def leaving_group(self, part: int, direction: int, among: int, *, table: bool = True) -> int:
+        """Bitset of the smallest group that holds a part and can leave the rest of `among` along a direction.
+
+        0 when there is none, because a fixed part or the table would have to move. The group may be all of `among`.
+        """
+        if table and self.into_table[direction]:
+            return 0
+        group = self.carried(1 << part, direction, among)
+        return 0 if group & self.assembly.fixed_mask else group
+
+    def components(self, direction: int, among: int, *, table: bool = True) -> list[int]:
+        """The parts in `among` as bitsets that can leave along a direction only together, in an order that works.
+
+        These are the strongly connected components of the direction's graph: each hits only itself and earlier
+        ones. Those that a fixed part or the table keeps are left out; `carried` says which parts they would move.
+        """
+        if table and self.into_table[direction]:
+            return []
+        index = self.assembly.index
+        groups = nx.strongly_connected_components(self.graph(direction, among))
+        masks = [sum(1 << index[name] for name in group) for group in groups]
+        fixed = self.assembly.fixed_mask
+        kept = 0
+        found = []
+        for mask in masks:  # networkx gives a component after those it leads to
+            if mask & fixed or self.group_blockers(mask, direction, kept):
+                kept |= mask
+            else:
+                found.append(mask)
+        return found
 
     def graph(self, direction: int, among: int | None = None) -> nx.DiGraph:
         """The graph of one direction: an edge from a part to each part that it would hit.

@@ -130,8 +130,8 @@ def _contact(a: int, b: int, points: Array, normal: Array, touch: float) -> Cont
 
 
 def _table_contacts(assembly: Assembly) -> list[Contact]:
-    found = []
-    for i in range(len(assembly.bodies)):
+    found: list[Contact] = []
+    for i in range(len(assembly.bodies) if assembly.has_table else 0):
         if assembly.body_bounds[i, 0, 2] > assembly.ground + assembly.touch:
             continue
         vertices = assembly.body_vertices(i)

@@ -8,6 +8,7 @@ motion in which gravity does work and no contact resists: the evidence, and the 
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -41,10 +42,18 @@ MOVES = 1e-6
 
 @dataclass(frozen=True)
 class Standing:
-    """Whether a subset of parts stands: if not, which parts move in a virtual motion that nothing resists."""
+    """Whether a subset of parts stands.
+
+    Attributes:
+        stands: the answer.
+        moving: if not, a bitset of parts that move in a virtual motion that nothing resists. While all of them are
+            there, none of them held, any smaller subset falls too.
+        held: a bitset of the parts that have to be held for it to stand.
+    """
 
     stands: bool
     moving: int = 0
+    held: int = 0
 
 
 class Stability:
@@ -60,7 +69,7 @@ class Stability:
     def __init__(self, assembly: Assembly) -> None:
         self.assembly = assembly
         n = len(assembly)
-        self._answers: dict[int, Standing] = {}
+        self._answers: dict[tuple[int, int], Standing] = {}
         self.masses, self._centres = _masses(assembly)
         patches = merged_patches(assembly, assembly.contacts())
         self.touching, self.supports, self.on_table, self.table_supports = [0] * n, [0] * n, 0, 0
@@ -77,14 +86,56 @@ class Stability:
         self._patch_bits = [(1 << p.a) | (0 if p.b == TABLE else 1 << p.b) for p in patches]
         self._assemble(patches)
 
-    def standing(self, subset: int) -> Standing:
-        """Whether the parts in a bitset stand by themselves."""
-        answer = self._answers.get(subset)
+    def standing(self, subset: int, held: int = 0) -> Standing:
+        """Whether the parts in a bitset stand while those in `held` and the fixed parts cannot move."""
+        held &= subset
+        answer = self._answers.get((subset, held))
         if answer is None:
-            answer = self._solve(subset)
+            answer = self._solve(subset, held)
             if self.assembly.keeps_answers:
-                self._answers[subset] = answer
+                self._answers[subset, held] = answer
         return answer
+
+    def standing_when_held(self, subset: int, most: int, *, hands: int = -1) -> Standing:
+        """Whether the parts in a bitset stand when the right ones, `most` of them at the most, are held.
+
+        Holding helps only against a motion in which the held part moves. So where a subset falls, one of the parts that
+        move is held, and the question is asked again: a search for a set that hits every motion.
+
+        Args:
+            subset: bitset of the parts that are there.
+            most: how many may be held.
+            hands: bitset of the parts that can be held; default any that is not fixed.
+
+        Returns:
+            `held` is what to hold; if nothing helps, `moving` are the parts that move in one motion or another, whose
+            presence is enough for the subset and any smaller one to fall.
+        """
+        hands &= subset & ~self.assembly.fixed_mask
+        motions: list[int] = []
+
+        def search(held: int, left: int, barred: int) -> int | None:
+            while True:
+                missed = [m & hands & ~barred for m in motions if not m & held]
+                if not missed:
+                    answer = self.standing(subset, held)
+                    if answer.stands:
+                        return held
+                    motions.append(answer.moving)
+                    continue
+                if not left:
+                    return None
+                for part in bits(min(missed, key=int.bit_count)):
+                    found = search(held | 1 << part, left - 1, barred)
+                    if found is not None:
+                        return found
+                    barred |= 1 << part
+                return None
+
+        found = search(0, most, 0)
+        if found is not None:
+            return Standing(True, 0, found)
+        return Standing(False, functools.reduce(int.__or__, motions, 0))
 
     def _assemble(self, patches: tuple[Contact, ...]) -> None:
         """The equilibrium matrix of all patches: 6 rows a part, CONE_EDGES columns a patch corner."""
@@ -120,10 +171,10 @@ class Stability:
         else:
             self._matrix = csc_array(shape)
 
-    def _solve(self, subset: int) -> Standing:
-        parts = bits(subset)
+    def _solve(self, subset: int, held: int) -> Standing:
+        parts = bits(subset & ~held & ~self.assembly.fixed_mask)
         if not parts:
-            return Standing(True)
+            return Standing(True, 0, held)
         present = np.array([(need & subset) == need for need in self._patch_bits], dtype=bool)
         columns = np.flatnonzero(present[self._patch_of]) if len(self._patch_of) else np.zeros(0, dtype=int)
         rows = (6 * np.array(parts)[:, None] + np.arange(6)).ravel()
@@ -145,10 +196,10 @@ class Stability:
                 f"the solver said: {result.message}. Check the scale of the parts (their units)."
             )
         if result.fun <= BALANCE * len(parts):
-            return Standing(True)
+            return Standing(True, 0, held)
         speed = np.abs(result.eqlin.marginals.reshape(-1, 6)).max(axis=1)
         moving = sum(1 << parts[i] for i in np.flatnonzero(speed > MOVES * speed.max()))
-        return Standing(False, moving)
+        return Standing(False, moving, held)
 
 
 def _patch_axes(patch: Contact) -> tuple[Array, Array]:
