@@ -6,12 +6,13 @@ its own orders (`predict`) with those of pictures it never saw. Finished trials 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
 from neurosym import __version__
+from neurosym.engines import run_tasks
+from neurosym.family import Progress
 from neurosym.imitation_report import report, write_results
 from neurosym.journal import Journal, key_of
 from neurosym.studies import Study, Trial, study, study_names
@@ -28,19 +29,37 @@ TRIALS_VERSION = 2
 
 
 def reproduce_study(
-    given: Study, out: Path, *, workers: int = 1, epochs: int | None = None, say: Say = lambda _: None
+    given: Study,
+    out: Path,
+    *,
+    workers: int | None = 1,
+    engine: str = "local",
+    address: str | None = None,
+    epochs: int | None = None,
+    say: Say = lambda _: None,
+    progress: Progress = lambda done, total: None,
 ) -> Results:
-    """Run the trials that are not done yet; write results.csv, report.md and figures into `out`."""
+    """Run the trials that are not done yet; write results.csv, report.md and figures into `out`.
+
+    Args:
+        workers, engine, address: where trials run, see `neurosym.engines.run_tasks`.
+        epochs: None takes each recipe's.
+        say: told what is going on.
+        progress: called with (done, total) trials.
+    """
     journal = Journal(out / "trials.jsonl")
     trials = given.trials()
     keys = {t: _key(given, t, epochs) for t in trials}
     missing = [t for t in trials if keys[t] not in journal]
     say(f"{len(trials) - len(missing)} of {len(trials)} trials are done already.")
-    for done, (trial, found) in enumerate(_run_all(missing, given, epochs, workers)):
+    progress(len(trials) - len(missing), len(trials))
+    ran = run_tasks(lambda t: run_trial(t, given, epochs), missing, engine=engine, workers=workers, address=address)
+    for done, (trial, found) in enumerate(ran, len(trials) - len(missing) + 1):
         journal.add({keys[trial]: found})
+        progress(done, len(trials))
         figures = found["figures"]
         say(
-            f"[{done + 1}/{len(missing)}] {trial.method}, {trial.pictures} pictures, n = {trial.n}, seed {trial.seed}: "
+            f"[{done}/{len(trials)}] {trial.method}, {trial.pictures} pictures, n = {trial.n}, seed {trial.seed}: "
             f"{figures['whole_sequence']:.2f} whole, {figures['per_step']:.2f} a step"
         )
     results = Results.of(given, {t: journal[keys[t]] for t in trials})
@@ -52,19 +71,3 @@ def _key(given: Study, trial: Trial, epochs: int | None) -> str:
     """A digest of all that decides a trial."""
     data = [given.domain, given.part, given.options(trial.n), given.test(trial.n)]
     return key_of({"trial": asdict(trial), "data": data, "epochs": epochs, "version": [__version__, TRIALS_VERSION]})
-
-
-def _run_all(
-    missing: Sequence[Trial], given: Study, epochs: int | None, workers: int
-) -> Iterable[tuple[Trial, dict[str, Any]]]:
-    if workers <= 1 or len(missing) <= 1:
-        return ((t, run_trial(t, given, epochs)) for t in missing)
-    from joblib import Parallel, delayed
-
-    def run(trial: Trial) -> tuple[Trial, dict[str, Any]]:
-        return trial, run_trial(trial, given, epochs)
-
-    finished: Iterable[tuple[Trial, dict[str, Any]]] = Parallel(n_jobs=workers, return_as="generator_unordered")(
-        delayed(run)(t) for t in missing
-    )
-    return finished

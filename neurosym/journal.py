@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 import os
@@ -28,13 +29,13 @@ class Journal:
         self._entries: dict[str, dict[str, Any]] = {}
         self._torn = False
         if self.path is not None and self.path.exists():
-            for line in self.path.read_bytes().split(b"\n"):
-                try:
-                    entry = json.loads(line)
-                    self._entries[entry["key"]] = dict(entry["value"])
-                except (ValueError, KeyError, TypeError):
-                    # What a kill left half written is done again.
-                    self._torn = self._torn or bool(line)
+            content = self.path.read_bytes()
+            # A line may be whole and lack only its end.
+            self._torn = not content.endswith(b"\n") and bool(content)
+            for line in content.split(b"\n"):
+                # What a kill left half written is done again.
+                with contextlib.suppress(ValueError, KeyError, TypeError):
+                    self._keep(line)
 
     def __contains__(self, key: str) -> bool:
         return key in self._entries
@@ -49,14 +50,22 @@ class Journal:
         """Keep finished results: all lines in one write, on disk when this returns."""
         if self.path is None or not entries:
             return
-        lines = "".join(json.dumps({"key": key, "value": dict(value)}) + "\n" for key, value in entries.items())
+        lines = [json.dumps({"key": key, "value": dict(value)}) for key, value in entries.items()]
         self.path.parent.mkdir(parents=True, exist_ok=True)
         handle = os.open(self.path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o644)
         try:
             # Whatever was torn ends here, so that the next line begins on its own.
-            os.write(handle, (("\n" if self._torn else "") + lines).encode())
+            left = memoryview((("\n" if self._torn else "") + "".join(line + "\n" for line in lines)).encode())
+            while left:
+                left = left[os.write(handle, left) :]
             os.fsync(handle)
         finally:
             os.close(handle)
         self._torn = False
-        self._entries.update({key: dict(value) for key, value in entries.items()})
+        for line in lines:
+            self._keep(line)
+
+    def _keep(self, line: str | bytes) -> None:
+        """Remember what a line says; so a value is the same now and when it is read again after a kill."""
+        entry = json.loads(line)
+        self._entries[entry["key"]] = dict(entry["value"])
