@@ -1,0 +1,114 @@
+"""What a reader gives, and the limits that every reader keeps."""
+
+from __future__ import annotations
+
+import gzip
+import io
+import stat
+import zlib
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from neurosym.errors import AssemblyError
+from neurosym.geometry.notes import Note
+
+Array = NDArray[np.float64]
+
+#: A file, or what a compressed one unpacks to, may be this large. 10 million triangles of STL are half of it.
+MAX_BYTES = 1 << 30
+
+#: An XML or JSON text may be this large: parsed, it takes some twenty times as much memory.
+MAX_TEXT_BYTES = 1 << 28
+
+#: Triangles of one part. The geometry of pairs grows faster than linearly with them.
+MAX_FACES = 2_000_000
+
+#: Parts of one assembly, fixed ones included.
+MAX_PARTS = 10_000
+
+#: Rounding of coordinates stored in 32 and in 64 bits, as a share of their size.
+FLOAT32, FLOAT64 = 2.0**-24, 2.0**-53
+
+
+@dataclass(frozen=True, eq=False)
+class RawMesh:
+    """A mesh as it stands in a file, unchecked.
+
+    Attributes:
+        name: of the part, as the file has it; perhaps empty, perhaps not unique.
+        vertices: float64 (n, 3), in the world, in the file's unit.
+        faces: int64 (m, 3), numbers of vertices.
+        rounding: of the coordinates, as a share of their size.
+    """
+
+    name: str
+    vertices: Array
+    faces: NDArray[np.int64]
+    rounding: float = FLOAT64
+
+
+@dataclass(frozen=True, eq=False)
+class Contents:
+    """What was read. ``units``: the unit that the format states, or None; ``notes``: what was odd but harmless."""
+
+    meshes: tuple[RawMesh, ...]
+    units: str | None = None
+    notes: tuple[Note, ...] = ()
+
+
+def read_bytes(path: Path, limit: int = MAX_BYTES) -> bytes:
+    """A file, if it is a regular file no larger than `limit`.
+
+    Raises:
+        AssemblyError: it is absent, too large, a device or a pipe, or cannot be read.
+    """
+    try:
+        status = path.stat()
+        if not stat.S_ISREG(status.st_mode):
+            raise AssemblyError(f"Expected a regular file; {path} is none.")
+        if status.st_size <= limit:
+            with open(path, "rb") as file:
+                data = file.read(limit + 1)
+            if len(data) <= limit:
+                return data
+    except (OSError, ValueError) as error:
+        raise AssemblyError(f"Expected a file that can be read; got {path}: {error}.") from None
+    raise too_large(path, limit)
+
+
+def too_large(path: Path, limit: int) -> AssemblyError:
+    """The error for a file beyond a limit of bytes."""
+    return AssemblyError(f"Expected at most {limit:,} bytes in {path}; it has more. Give simpler meshes, or fewer.")
+
+
+def gunzip(data: bytes, path: Path, limit: int = MAX_TEXT_BYTES) -> bytes:
+    """Gzip'd data unpacked, no further than `limit`; data that is not gzip'd comes back as it is."""
+    if not data.startswith(b"\x1f\x8b"):
+        return data
+    try:
+        with gzip.GzipFile(fileobj=io.BytesIO(data)) as file:
+            unpacked = file.read(limit + 1)
+    except (OSError, EOFError, zlib.error) as error:
+        raise AssemblyError(f"Expected whole gzip'd data in {path}; got: {error}.") from None
+    if len(unpacked) > limit:
+        raise too_large(path, limit)
+    return unpacked
+
+
+def inside(folder: Path, name: str) -> Path:
+    """The file that a relative name means, if it lies in the folder.
+
+    Raises:
+        AssemblyError: it lies elsewhere, directly, through ``..`` or through a link.
+    """
+    try:
+        root = folder.resolve()
+        found = (root / name).resolve()
+        if not Path(name).is_absolute() and found.is_relative_to(root):
+            return found
+    except (OSError, ValueError, RuntimeError):
+        pass
+    raise AssemblyError(f"Expected files inside {folder}; {name!r} lies outside, or is no path. Put it beside.")

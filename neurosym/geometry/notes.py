@@ -1,0 +1,49 @@
+"""What was found about a part while it was loaded: harmless findings are kept, faults are raised together."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from neurosym.errors import AssemblyError
+
+#: Faults shown in one message; the error's `notes` has them all.
+SHOWN = 20
+
+
+@dataclass(frozen=True)
+class Note:
+    """One finding.
+
+    Attributes:
+        part: name of the part; empty when it is about the file as a whole.
+        kind: one word: "open", "inverted", "winding", "self-intersecting", "degenerate", "nan", "empty", "flat",
+            "far", "overlap", "floating", "name", "units", "axes", "t-junction", "skipped".
+        measure: how much of it: edges, faces, a length, a volume; 0 where nothing is measured.
+        sentence: what was found, and what was done about it if anything was.
+        remedy: what to do about it; empty when nothing need be done.
+        other: name of the second part, for findings about a pair.
+    """
+
+    part: str
+    kind: str
+    measure: float
+    sentence: str
+    remedy: str = ""
+    other: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.sentence} {self.remedy}".rstrip()
+
+
+class FaultyPartsError(AssemblyError):
+    """Parts that cannot be used. ``notes``: every fault found, part by part."""
+
+    def __init__(self, source: str, faults: Iterable[Note]) -> None:
+        self.notes = tuple(faults)
+        lines = [f"  {fault}" for fault in self.notes[:SHOWN]]
+        if len(self.notes) > SHOWN:
+            lines.append(f"  and {len(self.notes) - SHOWN} more.")
+        parts = len({name for fault in self.notes for name in (fault.part, fault.other) if name})
+        head = f"Expected sound parts in {source}; got {len(self.notes)} fault{'s' if len(self.notes) != 1 else ''}"
+        super().__init__(f"{head} in {parts} part{'s' if parts != 1 else ''}:\n" + "\n".join(lines))
