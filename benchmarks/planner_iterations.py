@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from neurosym.benchmark import NO_PRIOR, Comparison, Outcome, run
-from neurosym.commands.common import cores
+from neurosym.engines import cores
 from neurosym.registry import load_domain
 from neurosym.reporting import rows
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import inspect
 import zlib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,6 +18,7 @@ import numpy as np
 
 from neurosym import __version__
 from neurosym.baseline import best_fixed_order, order_fails
+from neurosym.engines import cores, run_tasks
 from neurosym.errors import InputError
 from neurosym.family import Progress
 from neurosym.journal import Journal, key_of
@@ -161,7 +162,9 @@ def run(
     comparison: Comparison,
     scores: Mapping[str, Sequence[OrderScores] | None] | None = None,
     *,
-    workers: int = 1,
+    workers: int | None = 1,
+    engine: str = "local",
+    address: str | None = None,
     journal: str | Path | None = None,
     progress: Progress | None = None,
 ) -> tuple[Run, ...]:
@@ -169,14 +172,14 @@ def run(
 
     Args:
         scores: what `ask_priors` gives; None asks.
-        workers: processes.
+        workers, engine, address: where problems are solved, see `neurosym.engines.run_tasks`.
         journal: file (JSON lines) that keeps finished runs; those it has are not run again.
         progress: called with (done, total) runs.
 
     Raises:
         ContractError: a planner's plan does not survive its replay.
     """
-    scores = ask_priors(comparison, workers=workers) if scores is None else scores
+    scores = ask_priors(comparison, workers=min(workers or cores(), cores())) if scores is None else scores
     kept = Journal(journal)
     done: dict[tuple[Cell, int], Run] = {}
     jobs = []
@@ -192,7 +195,9 @@ def run(
     total = len(comparison.numbers) * len(comparison.cells)
     if progress is not None:
         progress(len(done), total)
-    for finished in _fan_out(jobs, workers):
+    # Processes, not threads: FCL holds the interpreter's lock. Problems are rebuilt there; FCL's objects cannot travel.
+    solved = run_tasks(lambda job: _solve_one(*job), jobs, engine=engine, workers=workers, address=address)
+    for _, finished in solved:
         kept.add({key: asdict(result) for key, result in finished})
         for _, result in finished:
             done[(result.planner, result.prior, result.seed), result.number] = result
@@ -220,18 +225,6 @@ def image_blind(comparison: Comparison, *, split: int = 0) -> tuple[float, tuple
         with open_oracle(problem, comparison.oracle) as search:
             failures += order_fails(search, [problem.actions.index(a) for a in order])
     return failures / len(comparison.numbers), order
-
-
-def _fan_out(jobs: Sequence[tuple[Any, ...]], workers: int) -> Iterable[list[tuple[str, Run]]]:
-    if workers <= 1 or len(jobs) <= 1:
-        return (_solve_one(*job) for job in jobs)
-    from joblib import Parallel, delayed
-
-    # Processes, not threads: FCL holds the interpreter's lock. Problems are rebuilt there; FCL's objects cannot travel.
-    finished: Iterable[list[tuple[str, Run]]] = Parallel(n_jobs=workers, return_as="generator_unordered")(
-        delayed(_solve_one)(*job) for job in jobs
-    )
-    return finished
 
 
 def _solve_one(

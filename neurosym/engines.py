@@ -10,7 +10,7 @@ import os
 import socket
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from typing import Any, NoReturn, TypeVar
 
 from neurosym import __version__
@@ -28,6 +28,11 @@ RETRIES = 5
 #: A cluster that does not answer within so many seconds is not there. Ray itself would try for two minutes, and then
 #: end the process.
 REACH_SECONDS = 5.0
+
+
+def cores() -> int:
+    """Processors that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def run_tasks(
@@ -68,18 +73,25 @@ def run_tasks(
         raise InputError(f"Expected no address with engine='local'; got {address!r}. Did you mean engine='ray'?")
     if workers == 1:
         return ((task, function(task)) for task in tasks)
-    return _in_processes(function, tasks, workers)
+    return _in_processes(function, tasks, workers or cores())
+
+
+@contextmanager
+def connection(engine: str, address: str | None = None) -> Iterator[None]:
+    """Stay connected, for several runs in a row; raises as `run_tasks` does. With the local engine it does nothing."""
+    with _connected(address) if engine == "ray" else nullcontext():
+        yield
 
 
 def _in_processes(
-    function: Callable[[Task], Result], tasks: Sequence[Task], workers: int | None
+    function: Callable[[Task], Result], tasks: Sequence[Task], workers: int
 ) -> Iterator[tuple[Task, Result]]:
     from joblib import Parallel, delayed, parallel_config
     from joblib.externals.loky.process_executor import BrokenProcessPool
 
     # Left before the first result: a generator that is suspended inside would configure its caller, too.
     with parallel_config(backend="loky", inner_max_num_threads=1):
-        pool = Parallel(n_jobs=-1 if workers is None else workers, return_as="generator_unordered", batch_size=1)
+        pool = Parallel(n_jobs=workers, return_as="generator_unordered", batch_size=1)
     finished = pool(delayed(_alone)(function, task, k) for k, task in enumerate(tasks))
     try:
         for k, result in finished:

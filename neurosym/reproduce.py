@@ -10,8 +10,10 @@ import io
 import json
 import os
 import platform
-from collections.abc import Callable, Iterable, Sequence
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,9 +21,10 @@ import numpy as np
 
 from neurosym import __version__, benchmark
 from neurosym.benchmark import Comparison, Outcome, Run
+from neurosym.engines import connection, cores, run_tasks
 from neurosym.errors import InputError
-from neurosym.family import ProblemFamily
-from neurosym.files import write_text
+from neurosym.family import Progress
+from neurosym.files import write_text, written_whole
 from neurosym.registry import load_domain, load_prior
 
 #: Called with one line about what is going on.
@@ -84,14 +87,23 @@ class Record:
     value: float
 
 
-def reproduce(experiment: Experiment, out: Path, *, workers: int = 1, say: Say = lambda _: None) -> list[Record]:
+def reproduce(
+    experiment: Experiment,
+    out: Path,
+    *,
+    workers: int | None = 1,
+    engine: str = "local",
+    address: str | None = None,
+    say: Say = lambda _: None,
+    progress: Progress = lambda done, total: None,
+) -> list[Record]:
     """Train what is not trained yet, compare, and write results.csv, report.md and iterations.png into `out`.
 
     Args:
-        workers: processes; each trains with one thread.
+        workers, engine, address: where networks are trained and problems solved, see `neurosym.engines.run_tasks`.
         say: told what is going on.
+        progress: called with (done, total) trainings and comparisons.
     """
-    family = load_domain(experiment.domain)
     _same_experiment(experiment, out)
     cells = [
         Cell(style, method, split)
@@ -99,59 +111,71 @@ def reproduce(experiment: Experiment, out: Path, *, workers: int = 1, say: Say =
         for style in experiment.styles
         for method in experiment.methods
     ]
-    for style in experiment.styles:
-        _make_demonstrations(family, experiment, style, [c for c in cells if c.style == style], out, say)
+    total = len(cells) + experiment.splits * len(experiment.styles)
     missing = [c for c in cells if not c.path(out).exists()]
     say(f"{len(cells) - len(missing)} of {len(cells)} networks are trained already.")
-    for k, line in enumerate(_train_all(experiment, missing, out, workers)):
-        say(f"[{k + 1}/{len(missing)}] {line}")
-
+    progress(len(cells) - len(missing), total)
     records: list[Record] = []
     outcomes: dict[tuple[str, int], Outcome] = {}
-    for style in experiment.styles:
-        for split in range(experiment.splits):
-            outcome = _compare(experiment, style, split, out, workers)
-            outcomes[style, split] = outcome
-            records += _records(experiment, outcome, style, split, out)
-            say(f"{style} pictures, split {split}: compared.")
+    with connection(engine, address):
+        run = partial(run_tasks, engine=engine, workers=workers, address=address)
+        if engine == "local":
+            _make_demonstrations(experiment, missing, say)
+        for done, line in enumerate(_train_all(experiment, missing, out, run, keep=engine == "local"), 1):
+            say(f"[{len(cells) - len(missing) + done}/{len(cells)}] {line}")
+            progress(len(cells) - len(missing) + done, total)
+        for style in experiment.styles:
+            for split in range(experiment.splits):
+                outcome = _compare(experiment, style, split, out, engine=engine, workers=workers, address=address)
+                outcomes[style, split] = outcome
+                records += _records(experiment, outcome, style, split, out)
+                say(f"{style} pictures, split {split}: compared.")
+                progress(len(cells) + len(outcomes), total)
     _write(experiment, records, outcomes, out)
     return records
 
 
-def train_cell(experiment: Experiment, cell: Cell, out: Path) -> str:
-    """Train one network and keep its weights; a checkpoint lets a killed training go on."""
-    family = load_domain(experiment.domain)
-    recipe = _recipe(cell.method)
-    given = family.demonstrations(
-        "train", split=cell.split, recipe=recipe, style=cell.style, seed=experiment.seed
-    )
+def train_cell(experiment: Experiment, cell: Cell, checkpoint: Path | None) -> tuple[bytes, float]:
+    """Train one network: the content of its weights file, and the seconds it took.
+
+    Args:
+        checkpoint: lets a training that was killed go on; it stays. None begins anew.
+    """
     learner: Any = load_prior(cell.method)
-    path = cell.path(out)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    checkpoint = path.with_suffix(".checkpoint")
-    learner.fit(given, seed=experiment.seed, epochs=experiment.epochs, checkpoint=checkpoint)
-    learner.save(path, notes={"split": cell.split, "pictures": cell.style, "seed": experiment.seed})
-    checkpoint.unlink(missing_ok=True)
-    return f"{cell.method}, {cell.style} pictures, split {cell.split}: {learner.header['training']['seconds']:.0f} s"
-
-
-def _train_all(experiment: Experiment, missing: Sequence[Cell], out: Path, workers: int) -> Iterable[str]:
-    if workers <= 1 or len(missing) <= 1:
-        return (train_cell(experiment, cell, out) for cell in missing)
-    from joblib import Parallel, delayed
-
-    lines: Iterable[str] = Parallel(n_jobs=workers, return_as="generator_unordered")(
-        delayed(train_cell)(experiment, cell, out) for cell in missing
+    given = load_domain(experiment.domain).demonstrations(
+        "train", split=cell.split, recipe=_recipe(cell.method), style=cell.style, seed=experiment.seed
     )
-    return lines
+    learner.fit(given, seed=experiment.seed, epochs=experiment.epochs, checkpoint=checkpoint)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "weights.safetensors"
+        learner.save(path, notes={"split": cell.split, "pictures": cell.style, "seed": experiment.seed})
+        return path.read_bytes(), float(learner.header["training"]["seconds"])
 
 
-def _make_demonstrations(
-    family: ProblemFamily, experiment: Experiment, style: str, cells: Sequence[Cell], out: Path, say: Say
-) -> None:
-    """Pictures and labels are kept on disk by the family; making them first keeps them out of the training times."""
-    wanted = {(c.split, _recipe(c.method)) for c in cells if not c.path(out).exists()}
-    for split, recipe in sorted(wanted):
+def _train_all(
+    experiment: Experiment, missing: Sequence[Cell], out: Path, run: Callable[..., Any], *, keep: bool
+) -> Iterator[str]:
+    """Train, and write each network's weights here, whoever trained it; a line about each.
+
+    Args:
+        keep: whether a network's checkpoint is kept beside its weights: other machines do not see them.
+    """
+
+    def checkpoint(cell: Cell) -> Path | None:
+        return cell.path(out).absolute().with_suffix(".checkpoint") if keep else None
+
+    (out / "weights").mkdir(parents=True, exist_ok=True)
+    for cell, (weights, seconds) in run(lambda c: train_cell(experiment, c, checkpoint(c)), missing):
+        with written_whole(cell.path(out)) as file:
+            file.write(weights)
+        cell.path(out).with_suffix(".checkpoint").unlink(missing_ok=True)
+        yield f"{cell.method}, {cell.style} pictures, split {cell.split}: {seconds:.0f} s"
+
+
+def _make_demonstrations(experiment: Experiment, missing: Sequence[Cell], say: Say) -> None:
+    """Pictures and labels are kept on disk by the family; made first, each is made once, on all processors."""
+    family = load_domain(experiment.domain)
+    for style, split, recipe in sorted({(c.style, c.split, _recipe(c.method)) for c in missing}):
         say(f"demonstrations: {style} pictures, split {split}, recipe {recipe}")
         family.demonstrations("train", split=split, recipe=recipe, style=style, seed=experiment.seed)
 
@@ -161,7 +185,16 @@ def _recipe(method: str) -> str:
     return str(getattr(load_prior(method), "labels", "full"))
 
 
-def _compare(experiment: Experiment, style: str, split: int, out: Path, workers: int) -> Outcome:
+def _compare(
+    experiment: Experiment,
+    style: str,
+    split: int,
+    out: Path,
+    *,
+    workers: int | None,
+    engine: str,
+    address: str | None,
+) -> Outcome:
     family = load_domain(experiment.domain)
     numbers = tuple(family.numbers("test", split=split))[: experiment.tests]
     comparison = Comparison(
@@ -172,10 +205,12 @@ def _compare(experiment: Experiment, style: str, split: int, out: Path, workers:
         options={"pictures": style, "seed": experiment.seed},
         seeds=experiment.repeats,
     )
-    problems = family.observed([family.problem(n, **comparison.options) for n in numbers], workers=workers)
+    here = min(workers or cores(), cores())
+    problems = family.observed([family.problem(n, **comparison.options) for n in numbers], workers=here)
     scores = {m: load_prior(Cell(style, m, split).path(out)).scores(problems) for m in experiment.methods}
     scores["random"] = load_prior("random").scores(problems)
-    runs = benchmark.run(comparison, scores, workers=workers, journal=out / f"runs-{style}-{split}.jsonl")
+    journal = out / f"runs-{style}-{split}.jsonl"
+    runs = benchmark.run(comparison, scores, workers=workers, engine=engine, address=address, journal=journal)
     blind = benchmark.image_blind(comparison, split=split)
     return Outcome(comparison, runs, *(blind or (None, ())))
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import inspect
 import json
-import os
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -65,11 +64,6 @@ def console(content: RenderableType = "") -> Console:
     out = Console(highlight=False)
     needed = out.measure(content, options=out.options.update(width=1000)).maximum
     return out if out.width >= needed else Console(highlight=False, width=needed)
-
-
-def cores() -> int:
-    """Processors that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def problem_options(family: ProblemFamily, **wanted: Any) -> dict[str, Any]:

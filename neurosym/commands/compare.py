@@ -21,7 +21,6 @@ from neurosym.commands.common import (
     PriorNames,
     Split,
     console,
-    cores,
     family_options,
     print_json,
     problem_options,
@@ -29,6 +28,7 @@ from neurosym.commands.common import (
     say,
     taken_by,
 )
+from neurosym.engines import cores
 from neurosym.errors import InputError, UnknownNameError
 from neurosym.family import ProblemFamily
 

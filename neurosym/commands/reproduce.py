@@ -8,7 +8,8 @@ from typing import Annotated
 
 import typer
 
-from neurosym.commands.common import Pictures, cores, say
+from neurosym.commands.common import Pictures, say
+from neurosym.engines import cores
 from neurosym.errors import UnknownNameError
 
 ExperimentName = Annotated[
