@@ -1,6 +1,28 @@
 """Figures. They are returned, never shown, and touch no global state of matplotlib: the caller saves or shows them."""
 
+from neurosym.plotting.confusion import confusion_figure
+from neurosym.plotting.curves import Curves, Spread, curves_figure
+from neurosym.plotting.density import density_figure
+from neurosym.plotting.errors import classes_figure, repeats_figure
 from neurosym.plotting.iterations import LAST_BAR, iterations_figure
-from neurosym.plotting.style import COLOURS, COLUMN, save
+from neurosym.plotting.points import Panel, points_figure
+from neurosym.plotting.style import COLOURS, COLUMN, look_of, save, save_both
 
-__all__ = ["COLOURS", "COLUMN", "LAST_BAR", "iterations_figure", "save"]
+__all__ = [
+    "COLOURS",
+    "COLUMN",
+    "LAST_BAR",
+    "Curves",
+    "Panel",
+    "Spread",
+    "classes_figure",
+    "confusion_figure",
+    "curves_figure",
+    "density_figure",
+    "iterations_figure",
+    "look_of",
+    "points_figure",
+    "repeats_figure",
+    "save",
+    "save_both",
+]

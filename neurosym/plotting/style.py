@@ -1,13 +1,15 @@
-"""What all figures share: colours, the width of a column, and how they are saved."""
+"""What all figures share: colours, the width of a column, how methods look, and how figures are saved."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from types import MappingProxyType
+from typing import TYPE_CHECKING, NamedTuple
 
 from neurosym.files import replacing
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 #: Okabe and Ito's colours, told apart by people with any of the common colour deficiencies. One a prior, in order.
@@ -16,9 +18,66 @@ COLOURS = ("#7f7f7f", "#E69F00", "#56B4E9", "#D55E00", "#0072B2", "#009E73", "#C
 #: Width of one column of a two-column page (inches).
 COLUMN = 3.4
 
+#: Sizes of letters (points): of titles and names of axes, and of all else.
+TITLE, SMALL = 8, 7
+
+
+class Look(NamedTuple):
+    """How a method is drawn: never by its colour alone."""
+
+    colour: str
+    marker: str
+    line: str = "-"
+
+
+#: The same in all figures.
+LOOKS = MappingProxyType(
+    {
+        "bc": Look("#56B4E9", "v"),
+        "bc+hungarian": Look("#0072B2", "^"),
+        "tcn-paper": Look("#E69F00", "s"),
+        "tcn-paper+hungarian": Look("#D55E00", "D"),
+        "sinkhorn-paper": Look("#009E73", "P"),
+        "tcn": Look("#CC79A7", "X"),
+        "sinkhorn": Look("#000000", "o"),
+        "memoriser": Look("0.35", "", "--"),
+        "blind": Look("0.35", "", ":"),
+        "random": Look("0.5", "."),
+    }
+)
+_OTHERS = (Look("#CC79A7", "<"), Look("#7f7f7f", ">"), Look("#0072B2", "*"), Look("#D55E00", "h"))
+
+
+def look_of(method: str, position: int = 0) -> Look:
+    """How a method is drawn; others than the known ones by their position."""
+    return LOOKS.get(method) or _OTHERS[position % len(_OTHERS)]
+
+
+def tidy(axis: Axes, *, sides: tuple[str, ...] = ("top", "right")) -> None:
+    """Small letters, and no frame where it says nothing."""
+    axis.tick_params(labelsize=SMALL)
+    for side in sides:
+        axis.spines[side].set_visible(False)
+
 
 def save(figure: Figure, path: str | Path, *, dpi: int = 200) -> Path:
-    """Write a figure to a file, whole or not at all; its folder is made. Returns the path."""
+    """Write a figure to a file, whole or not at all; its folder is made. Returns the path.
+
+    Its ending says what it becomes, ``.png`` or ``.svg`` say; the same figure gives the same bytes.
+    """
     with replacing(path) as temporary:
-        figure.savefig(temporary, dpi=dpi)
+        if Path(path).suffix == ".svg":
+            import matplotlib
+
+            # Identifiers in an SVG are random, and its date is now, unless told otherwise.
+            with matplotlib.rc_context({"svg.hashsalt": Path(path).name}):
+                figure.savefig(temporary, metadata={"Date": None})
+        else:
+            figure.savefig(temporary, dpi=dpi)
     return Path(path)
+
+
+def save_both(figure: Figure, stem: str | Path, *, dpi: int = 200) -> tuple[Path, Path]:
+    """Write ``STEM.png`` and ``STEM.svg``; returns both paths."""
+    path = Path(stem)
+    return save(figure, path.with_name(path.name + ".png"), dpi=dpi), save(figure, path.with_name(path.name + ".svg"))

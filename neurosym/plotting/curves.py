@@ -1,0 +1,113 @@
+"""Curves over the number of demonstrations or actions, as the paper's Fig. 5, 6 and 9."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from neurosym.measures import Counts
+from neurosym.plotting.style import COLUMN, SMALL, TITLE, look_of, tidy
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True)
+class Curves:
+    """One panel of curves.
+
+    Attributes:
+        title: what is on the vertical axis, with its unit.
+        values: method -> n -> a value a seed.
+    """
+
+    title: str
+    values: Mapping[str, Mapping[int, Sequence[float]]]
+
+
+@dataclass(frozen=True)
+class Spread:
+    """How single sequences come out with growing n: one method's counts, n -> Counts."""
+
+    method: str
+    counts: Mapping[int, Counts] = field(default_factory=dict)
+
+
+def curves_figure(
+    title: str, across: str, panels: Sequence[Curves], *, spread: Spread | None = None, log: bool = False
+) -> Figure:
+    """Panels one above the other: a line is the mean over seeds, its band reaches from the least to the greatest.
+
+    Args:
+        title: of the figure.
+        across: what n counts.
+        panels: what is drawn.
+        spread: adds a panel: the area of a dot is the share of test sequences with that share of steps right.
+        log: whether n is on a logarithmic axis.
+    """
+    from matplotlib.figure import Figure
+
+    total = len(panels) + (spread is not None)
+    figure = Figure(figsize=(COLUMN, 0.9 + 1.1 * total), layout="constrained")
+    axes = figure.subplots(total, 1, sharex=True, squeeze=False)[:, 0]
+    for axis, panel in zip(axes, panels):
+        for position, (method, values) in enumerate(panel.values.items()):
+            _curve(axis, method, position, values)
+        axis.set_ylabel(panel.title, fontsize=TITLE)
+    if spread is not None:
+        _bubbles(axes[-1], spread)
+        axes[-1].set_ylabel("steps right in\none sequence", fontsize=TITLE)
+    sizes = sorted({n for panel in panels for values in panel.values.values() for n in values})
+    for axis in axes:
+        axis.set_ylim(-0.03, 1.05)
+        axis.set_yticks([0, 0.5, 1], ["0", ".5", "1"])
+        axis.grid(axis="y", color="0.9", lw=0.6)
+        axis.set_axisbelow(True)
+        tidy(axis)
+    _across(axes[-1], sizes, across, log)
+    figure.suptitle(title, fontsize=TITLE)
+    handles, labels = axes[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=2, fontsize=SMALL, frameon=False)
+    return figure
+
+
+def _curve(axis: Axes, method: str, position: int, values: Mapping[int, Sequence[float]]) -> None:
+    sizes = sorted(n for n in values if values[n])
+    if not sizes:
+        return
+    look = look_of(method, position)
+    mean = [float(np.mean(values[n])) for n in sizes]
+    if any(len(values[n]) > 1 for n in sizes):
+        low, high = [min(values[n]) for n in sizes], [max(values[n]) for n in sizes]
+        axis.fill_between(sizes, low, high, color=look.colour, alpha=0.18, lw=0)
+    # One n alone has no line: whatever has no marker gets one.
+    marker = look.marker or ("_" if len(sizes) == 1 else "")
+    axis.plot(sizes, mean, look.line, marker=marker, color=look.colour, ms=4, lw=1.3, label=method)
+
+
+def _bubbles(axis: Axes, spread: Spread) -> None:
+    look = look_of(spread.method)
+    for n, counts in spread.counts.items():
+        shares: dict[float, float] = {}
+        for length, row in enumerate(counts.right):
+            for right, pictures in enumerate(row):
+                if pictures:
+                    shares[right / length] = shares.get(right / length, 0) + pictures / counts.right.sum()
+        axis.scatter([n] * len(shares), list(shares), s=[90 * s for s in shares.values()], color=look.colour, lw=0)
+    axis.set_title(f"{spread.method}, all seeds; area: share of sequences", fontsize=SMALL, loc="left", pad=2)
+
+
+def _across(axis: Axes, sizes: Sequence[int], across: str, log: bool) -> None:
+    from matplotlib.ticker import NullFormatter, NullLocator
+
+    if log:
+        axis.set_xscale("log")
+        shown = sizes if len(sizes) <= 7 else sizes[:: -(-len(sizes) // 7)]
+        axis.set_xticks(shown, [str(n) for n in shown], fontsize=SMALL)
+        axis.xaxis.set_minor_locator(NullLocator())
+        axis.xaxis.set_minor_formatter(NullFormatter())
+    axis.set_xlabel(f"n: {across}", fontsize=TITLE)
