@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self, overload
 
@@ -76,6 +76,11 @@ class NetworkPrior(Prior):
     def labels(self) -> str:
         """Which demonstrations this recipe learns from: ``"full"``, with shares of valid orders, or ``"paper"``."""
         return "full" if self.recipe.train.soft else "paper"
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """All that decides what `fit` makes of demonstrations, as JSON has it."""
+        return {**asdict(self.recipe), "encoder": self.encoder}
 
     @property
     def header(self) -> dict[str, Any]:
@@ -166,6 +171,7 @@ class NetworkPrior(Prior):
         checkpoint: str | Path | None = None,
         resume: bool = True,
         config: TrainConfig | None = None,
+        settings: Mapping[str, Any] | None = None,
     ) -> Self:
         """Train a network on demonstrations; this prior then reads with it. Returns itself.
 
@@ -177,10 +183,11 @@ class NetworkPrior(Prior):
             checkpoint: file that keeps the state of the run; see `learned_priors.training.fit`.
             resume: go on from the checkpoint if it is there.
             config: instead of the recipe's `TrainConfig`.
+            settings: fields of the `TrainConfig` to change, ``{"epochs": 25, "rate": 4e-3}``; `epochs` goes before.
         """
         if device is not None:
             self.device = _checked_device(device)
-        train = config or self.recipe.train
+        train = (config or self.recipe.train).changed(settings or {})
         if epochs is not None:
             if epochs < 1:
                 raise InputError(f"Expected at least one epoch; got {epochs}.")

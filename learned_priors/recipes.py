@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Literal
 
@@ -60,6 +61,13 @@ class TrainConfig:
     calibrate: bool = False
     precision: Literal["float32", "bfloat16"] = "float32"
     checkpoint_seconds: float = 5.0
+
+    def changed(self, settings: Mapping[str, Any]) -> TrainConfig:
+        """With other values of some fields. Raises `UnknownNameError` for what is none."""
+        for name in settings:
+            if name not in self.__dataclass_fields__:
+                raise UnknownNameError("training setting", name, self.__dataclass_fields__)
+        return replace(self, **settings)
 
     def to_json(self) -> dict[str, Any]:
         return {**asdict(self), "classes": list(self.classes)}

@@ -8,13 +8,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import asdict
+from functools import cache
 from pathlib import Path
+from typing import Any
 
 from neurosym import __version__
 from neurosym.engines import run_tasks
 from neurosym.family import Progress
 from neurosym.imitation_report import report, write_results
 from neurosym.journal import Journal, key_of
+from neurosym.order_baselines import BASELINES
+from neurosym.registry import load_prior
 from neurosym.studies import Study, Trial, study, study_names
 from neurosym.study_results import Results
 from neurosym.trials import run_trial
@@ -25,7 +29,7 @@ __all__ = ["Results", "Study", "Trial", "report", "reproduce_study", "run_trial"
 Say = Callable[[str], None]
 
 #: Raise it whenever the same trial would give other figures, so that no journal answers for it.
-TRIALS_VERSION = 2
+TRIALS_VERSION = 3
 
 
 def reproduce_study(
@@ -70,4 +74,13 @@ def reproduce_study(
 def _key(given: Study, trial: Trial, epochs: int | None) -> str:
     """A digest of all that decides a trial."""
     data = [given.domain, given.part, given.options(trial.n), given.test(trial.n)]
-    return key_of({"trial": asdict(trial), "data": data, "epochs": epochs, "version": [__version__, TRIALS_VERSION]})
+    training = [_settings(trial.method), dict(given.train.get(trial.method, {})), epochs]
+    return key_of(
+        {"trial": asdict(trial), "data": data, "training": training, "version": [__version__, TRIALS_VERSION]}
+    )
+
+
+@cache
+def _settings(method: str) -> Any:
+    """How a method trains, as far as it says: one that was tuned is another."""
+    return None if method in BASELINES else getattr(load_prior(method), "settings", None)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from neurosym.errors import UnknownNameError
+from neurosym.study_scales import SCALES
 
 
 @dataclass(frozen=True)
@@ -36,6 +37,7 @@ class Study:
         published: method -> the paper's figures, by metric.
         pictures: styles.
         seeds: how often; each seed is another split and another training.
+        train: method -> settings of its training that differ here from its recipe's.
         baselines: names in `neurosym.order_baselines.BASELINES`; calculated for each style, n and seed.
         ours: which of the methods is not the paper's.
         about: what is asked, in a sentence.
@@ -53,6 +55,7 @@ class Study:
     published: Mapping[str, Mapping[str, float]] | None = None
     pictures: tuple[str, ...] = ("hard",)
     seeds: int = 3
+    train: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     baselines: tuple[str, ...] = ("memoriser", "blind")
     ours: str = "sinkhorn"
     about: str = ""
@@ -148,9 +151,15 @@ def study_names() -> list[str]:
     return sorted(_studies())
 
 
-def study(name: str) -> Study:
-    """The study of that name, at its quick scale: change it with `dataclasses.replace`."""
+def study(name: str, scale: str = "quick") -> Study:
+    """The study of that name: change it with `dataclasses.replace`.
+
+    Args:
+        scale: ``"quick"``, within 15 minutes on two cores, or ``"paper"``, as large as the paper's.
+    """
     known = _studies()
     if name not in known:
         raise UnknownNameError("study", name, known)
-    return known[name]
+    if scale not in SCALES:
+        raise UnknownNameError("scale", scale, SCALES)
+    return replace(known[name], **SCALES[scale].get(name, {}))

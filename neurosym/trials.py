@@ -26,7 +26,8 @@ def run_trial(trial: Trial, given: Study, epochs: int | None = None) -> dict[str
     seen = seen_in(train, test)
     if learner is None:
         return {"figures": averages(BASELINES[trial.method](train, test), seen), "counts": None}
-    learner.fit(train, seed=trial.seed, epochs=epochs)
+    changes = given.train.get(trial.method)
+    learner.fit(train, seed=trial.seed, epochs=epochs, **({"settings": changes} if changes else {}))
     orders = learner.predict(test.pictures)
     figures = averages(compare_orders(orders, test, classes_of(test)), seen)
     figures["training_seconds"] = float(learner.header["training"]["seconds"])
