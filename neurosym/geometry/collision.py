@@ -38,6 +38,11 @@ def shape_object(shape: Shape, X: Array, grow: float = 0.0) -> fcl.CollisionObje
     return box_object(shape.size + 2 * grow, X) if isinstance(shape, Box) else mesh_object(shape, X)
 
 
+def place(thing: fcl.CollisionObject, X: Array) -> None:
+    """Move an object to pose `X` (4, 4)."""
+    thing.setTransform(fcl.Transform(X[:3, :3], X[:3, 3]))
+
+
 def collide(a: fcl.CollisionObject, b: fcl.CollisionObject) -> bool:
     """Whether two objects overlap."""
     return bool(fcl.collide(a, b, fcl.CollisionRequest(), fcl.CollisionResult()) > 0)

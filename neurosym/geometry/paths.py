@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from neurosym.errors import InputError
+from neurosym.geometry.clearance import Clearance, Floor
+from neurosym.geometry.motions import Motion
 
 if TYPE_CHECKING:
     from neurosym.geometry.assembly import Assembly
@@ -40,7 +41,28 @@ class Track:
     def at(self, key: float) -> Array:
         """The motion, float64 (4, 4), at a key number from 0 to k - 1, whole or between two."""
         first = min(max(int(np.floor(key)), 0), len(self.poses) - 2)
-        return between(self.poses[first], self.poses[first + 1], min(max(key - first, 0.0), 1.0), self.centre)
+        return self.motion(first).at(min(max(key - first, 0.0), 1.0))
+
+    def motion(self, key: int) -> Motion:
+        """The motion from one pose, by its number, to the next."""
+        return Motion(self.poses[key], self.poses[key + 1], self.centre)
+
+
+@dataclass(frozen=True)
+class PathCheck:
+    """What a check of a path found.
+
+    Attributes:
+        holds: the path is clear all along, and ends with the leaving parts away from the others.
+        parts: where it is not, the two parts that meet; one part that reaches below the ground, or is not out.
+        key: where on the path: key number, whole or between two.
+        reason: that, in a sentence; empty when it holds.
+    """
+
+    holds: bool
+    parts: tuple[str, ...] = ()
+    key: float = 0.0
+    reason: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,10 +70,16 @@ class Path:
     """Motions of parts, all tracks from key to key at the same time.
 
     A removal starts in the assembled place; a path that is `reversed` ends there.
+
+    Attributes:
+        kind: how it was found.
+        tracks: what moves; other parts rest.
+        leaving: names of the parts that are away from all others at the far end; what else moves makes way.
     """
 
     kind: Kind
     tracks: tuple[Track, ...]
+    leaving: tuple[str, ...]
 
     def __post_init__(self) -> None:
         if self.kind not in get_args(Kind):
@@ -72,12 +100,14 @@ class Path:
         names = [name for track in self.tracks for name in track.parts]
         if not all(track.parts for track in self.tracks) or len(set(names)) != len(names):
             raise InputError("Expected each moving part in one track, and no track without a part.")
+        if not self.leaving or not set(self.leaving) <= set(names):
+            raise InputError(f"Expected the parts that leave to be some of those that move; got {self.leaving}.")
 
     @classmethod
     def of(cls, kind: Kind, parts: Sequence[str], poses: Array, centre: Array) -> Path:
         """A path of parts that move as one: a single track."""
         poses, centre = np.asarray(poses, dtype=np.float64), np.asarray(centre, dtype=np.float64)
-        return cls(kind, (Track(tuple(parts), poses, centre),))
+        return cls(kind, (Track(tuple(parts), poses, centre),), tuple(parts))
 
     @classmethod
     def straight(cls, assembly: Assembly, moving: int, direction: Array, among: int) -> Path:
@@ -115,12 +145,28 @@ class Path:
 
     def reversed(self) -> Path:
         """The same way back: a removal becomes an insertion."""
-        return Path(self.kind, tuple(Track(t.parts, t.poses[::-1].copy(), t.centre) for t in self.tracks))
+        return Path(self.kind, tuple(Track(t.parts, t.poses[::-1].copy(), t.centre) for t in self.tracks), self.leaving)
+
+    def check(self, assembly: Assembly, among: int, *, ground: float | None = None) -> PathCheck:
+        """Whether the path can be gone, found without anything that the searches know.
+
+        Every pair of parts that move relative to one another is followed along the whole way by `Clearance`, which
+        misses no overlap deeper than the touching tolerance (by more than a tenth of it) at any moment.
+
+        Args:
+            among: a bitset of the parts that are there; those that move are there in any case.
+            ground: height (z, world) of a plane that no part may go below; None: there is none.
+
+        Raises:
+            UnknownNameError: a moving part that the assembly does not have.
+        """
+        return check_path(self, assembly, among, ground)
 
     def to_json(self) -> dict[str, Any]:
         """Plain lists and numbers; `from_json` reads them."""
         return {
             "kind": self.kind,
+            "leaving": list(self.leaving),
             "tracks": [
                 {"parts": list(t.parts), "centre": t.centre.tolist(), "poses": t.poses.tolist()} for t in self.tracks
             ],
@@ -142,25 +188,13 @@ class Path:
                 )
                 for t in data["tracks"]
             )
-            return cls(data["kind"], tracks)
+            return cls(data["kind"], tracks, tuple(str(name) for name in data["leaving"]))
         except InputError:
             raise
         except (KeyError, TypeError, ValueError) as error:
-            raise InputError(f"Expected a path with its kind, tracks, parts, centre and poses; {error}.") from None
-
-
-def between(first: Array, second: Array, share: float, centre: Array) -> Array:
-    """The motion (4, 4) between two: `centre` (3,) goes straight, the rotation turns evenly the shorter way."""
-    R0, R1 = first[:3, :3], second[:3, :3]
-    if np.array_equal(R0, R1):
-        R = R0
-    else:
-        R = R0 @ Rotation.from_rotvec(share * Rotation.from_matrix(R0.T @ R1).as_rotvec()).as_matrix()
-    start, end = (X[:3, :3] @ centre + X[:3, 3] for X in (first, second))
-    motion = np.eye(4)
-    motion[:3, :3] = R
-    motion[:3, 3] = (1 - share) * start + share * end - R @ centre
-    return motion
+            raise InputError(
+                f"Expected a path with its kind, leaving, tracks, parts, centre and poses; got {error!r}."
+            ) from None
 
 
 def centre_of(assembly: Assembly, mask: int) -> Array:
@@ -168,3 +202,59 @@ def centre_of(assembly: Assembly, mask: int) -> Array:
     own = assembly.body_bounds[[mask >> int(o) & 1 == 1 for o in assembly.owners]]
     middle: Array = (own[:, 0].min(axis=0) + own[:, 1].max(axis=0)) / 2
     return middle
+
+
+def apart(assembly: Assembly, a: Array, b: Array) -> bool:
+    """Whether points (n, 3) and others (m, 3) leave a gap, wider than touch, along an axis of the world or assembly."""
+    axes = np.concatenate([np.eye(3), assembly.axes]).T
+    one, two = a @ axes, b @ axes
+    gap = np.maximum(one.min(axis=0) - two.max(axis=0), two.min(axis=0) - one.max(axis=0))
+    return bool(gap.max() > assembly.touch)
+
+
+def bodies_of(assembly: Assembly, mask: int) -> list[int]:
+    """Numbers of the bodies of the parts in a bitset."""
+    return [i for i, owner in enumerate(assembly.owners) if mask >> int(owner) & 1]
+
+
+def check_path(path: Path, assembly: Assembly, among: int, ground: float | None) -> PathCheck:
+    """See `Path.check`."""
+    masks = [sum(1 << assembly.index[assembly[name].name] for name in t.parts) for t in path.tracks]
+    bodies = [bodies_of(assembly, mask) for mask in masks]
+    resting = bodies_of(assembly, among & ~sum(masks))
+    pairs: list[tuple[int, int | None, Clearance]] = []
+    for a, own in enumerate(bodies):
+        if resting:
+            pairs.append((a, None, Clearance(assembly, own, resting)))
+        pairs.extend((a, b, Clearance(assembly, own, bodies[b])) for b in range(a))
+    floors = [] if ground is None else [Floor(assembly, own, ground) for own in bodies]
+    for key in range(len(path.tracks[0].poses) - 1):
+        motions = [t.motion(key) for t in path.tracks]
+        for a, b, clearance in pairs:
+            hit = clearance.first_hit(motions[a], None if b is None else motions[b])
+            if hit is not None:
+                names = tuple(assembly.names[assembly.owners[i]] for i in hit[1:])
+                at = key + hit[0]
+                return PathCheck(False, names, at, f"{names[0]} meets {names[1]} at {at:.3f} of the path's keys")
+        for track, floor, motion in zip(path.tracks, floors, motions):
+            share = floor.first_hit(motion)
+            if share is not None:
+                reason = f"{', '.join(track.parts)} would go below the ground at {key + share:.3f} of the path's keys"
+                return PathCheck(False, track.parts, key + share, reason)
+    return _away(path, assembly, among | sum(masks))
+
+
+def _away(path: Path, assembly: Assembly, among: int) -> PathCheck:
+    """Whether the leaving parts are away from all others at one of the two ends."""
+    for end in (-1, 0):
+        pose = {name: t.poses[end] for t in path.tracks for name in t.parts}
+        leaving: list[Array] = []
+        others: list[Array] = []
+        for i in bodies_of(assembly, among):
+            name = assembly.names[assembly.owners[i]]
+            X = pose.get(name, np.eye(4))
+            points = assembly.body_vertices(i) @ X[:3, :3].T + X[:3, 3]
+            (leaving if name in path.leaving else others).append(points)
+        if not others or apart(assembly, np.concatenate(leaving), np.concatenate(others)):
+            return PathCheck(True)
+    return PathCheck(False, path.leaving, len(path.poses) - 1.0, f"{', '.join(path.leaving)} is not out at the end")

@@ -233,7 +233,7 @@ def separation_path(cells: GridCells, separation: Separation, *, home: bool = Tr
         own = np.concatenate([cells.cells[p] for p in same]) + 0.5
         centre = cells.origin + cells.frame @ (own.mean(axis=0) * cells.pitch)
         tracks.append(Track(tuple(cells.names[p] for p in same), poses, centre))
-    return Path("moves", tuple(tracks))
+    return Path("moves", tuple(tracks), tuple(cells.names[p] for p in bits(separation.group)))
 
 
 def _way_out(cells: GridCells, keys: list[dict[int, NDArray[np.int64]]], parts: list[int]) -> int:

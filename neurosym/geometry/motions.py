@@ -1,0 +1,54 @@
+"""Rigid motions from one pose to another."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+Array = NDArray[np.float64]
+
+
+class Motion:
+    """A motion between two poses in which a body's centre goes straight and its rotation turns evenly.
+
+    Attributes:
+        first, second: float64 (4, 4): rigid motions of the world, applied to the body where it is assembled.
+        centre: float64 (3,): the point of the body, where it is assembled, that goes straight.
+        way: float64 (3,): how far the centre goes.
+        angle: how far the rotation turns, the shorter way (radians, 0 to pi).
+    """
+
+    def __init__(self, first: Array, second: Array, centre: Array) -> None:
+        self.first, self.second, self.centre = first, second, centre
+        self._start = first[:3, :3] @ centre + first[:3, 3]
+        self.way: Array = second[:3, :3] @ centre + second[:3, 3] - self._start
+        self.angle = 0.0
+        if not np.array_equal(first[:3, :3], second[:3, :3]):
+            turn = Rotation.from_matrix(first[:3, :3].T @ second[:3, :3]).as_rotvec()
+            self.angle = float(np.linalg.norm(turn))
+            x, y, z = turn / max(self.angle, 1e-300)
+            self._cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+    def travel(self, radius: float) -> float:
+        """How far a point within `radius` of the centre goes at most (length)."""
+        return float(np.linalg.norm(self.way)) + self.angle * radius
+
+    def at(self, share: float) -> Array:
+        """The motion of the world, float64 (4, 4), after a share from 0 to 1 of the way."""
+        X = np.eye(4)
+        R = self.first[:3, :3]
+        if self.angle:
+            # Rodrigues' formula.
+            angle, K = share * self.angle, self._cross
+            R = R @ (np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * (K @ K))
+        X[:3, :3] = R
+        X[:3, 3] = self._start + share * self.way - R @ self.centre
+        return X
+
+
+def shifted(way: Array) -> Array:
+    """The translation by a vector (3,), as a motion (4, 4)."""
+    X = np.eye(4)
+    X[:3, 3] = way
+    return X
