@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -82,7 +83,9 @@ def plans(
             results = searcher.plans(search, scores, k=k, budget=budget, rng=generator)  # type: ignore[attr-defined]
     for result in results:
         if result.plan is not None:
-            check_plan(problem, result.plan, oracle, planner)
+            check_plan(problem, result.plan, oracle, planner, result.how)
+    if problem.explain is not None and oracle == "geometry":
+        results = [r if r.solved else replace(r, why_not=problem.explain(r)) for r in results]
     return results
 
 
@@ -133,12 +136,14 @@ def open_oracle(problem: Problem, oracle: str) -> Any:
     from neurosym.simulation.oracle import PhysicsOracle
 
     removes = [rule.removes[name] for name in problem.actions]
-    return PhysicsOracle(problem.ground(), problem.world, removes=removes, bodies=rule.bodies, absent=rule.absent)
+    return PhysicsOracle(problem.symbols, problem.world, removes=removes, bodies=rule.bodies, absent=rule.absent)
 
 
-def check_plan(problem: Problem, plan: Sequence[str], oracle: str, planner: object) -> None:
+def check_plan(
+    problem: Problem, plan: Sequence[str], oracle: str, planner: object, how: Sequence[Any] = ()
+) -> None:
     if oracle == "geometry":
-        found = validate(problem, plan)
+        found = validate(problem, plan, how)
     else:
         with open_oracle(problem, oracle) as search:
             found = replay(search, plan)

@@ -8,16 +8,19 @@ from __future__ import annotations
 
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Hashable, Iterable, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import numpy as np
 
 from neurosym.errors import ContractError, InputError
 from neurosym.prior import OrderScores
 from neurosym.problem import Rejection, SearchProblem, Step
+
+if TYPE_CHECKING:
+    from neurosym.why_not import WhyNot
 
 S = TypeVar("S", bound=Hashable)
 
@@ -98,6 +101,36 @@ class Refusal:
     because: tuple[str, ...] = ()
 
 
+class Plan(tuple[str, ...]):
+    """Names of actions in order: a tuple that knows how each of them is done.
+
+    Attributes:
+        how: one entry an action, or none at all.
+    """
+
+    how: tuple[Any, ...]
+
+    def __new__(cls, actions: Iterable[str], how: Iterable[Any] = ()) -> Plan:
+        made = super().__new__(cls, actions)
+        made.how = tuple(how)
+        return made
+
+    def reversed(self) -> Plan:
+        """The plan backwards, for what was taken apart to be put together: last first, each motion inverted.
+
+        A `Way` inverts itself; a direction (three numbers) is negated; anything else is kept as it is.
+        """
+        return Plan(self[::-1], [_inverted(how) for how in self.how[::-1]])
+
+
+def _inverted(how: Any) -> Any:
+    if hasattr(how, "reversed"):
+        return how.reversed()
+    if isinstance(how, tuple) and len(how) == 3 and all(isinstance(v, float | int) for v in how):
+        return tuple(-v + 0.0 for v in how)
+    return how
+
+
 @dataclass(frozen=True)
 class PlanResult:
     """What a search found. `plan` is present exactly when `status` is SOLVED; anything else raises.
@@ -115,10 +148,11 @@ class PlanResult:
         cost: the plan's cost under the prior (nats), or None when there was no prior or no plan.
         first_guess_failed: whether the first complete order that was tried was refused somewhere;
             the paper's initial collapse. None when the search says nothing about it.
+        why_not: why the search could not go on, for a problem that can explain it and has no plan; else None.
     """
 
     status: Status
-    plan: tuple[str, ...] | None
+    plan: Plan | None
     iterations: int
     expansions: int
     attempts: int
@@ -128,6 +162,7 @@ class PlanResult:
     how: tuple[Any, ...] = ()
     cost: float | None = None
     first_guess_failed: bool | None = None
+    why_not: WhyNot | None = None
 
     def __post_init__(self) -> None:
         if (self.plan is not None) != (self.status is Status.SOLVED):
@@ -136,10 +171,22 @@ class PlanResult:
             )
         if self.plan is not None and len(self.how) not in (0, len(self.plan)):
             raise ContractError(f"Expected one `how` a step, {len(self.plan)} in all; got {len(self.how)}.")
+        if self.plan is not None:
+            object.__setattr__(self, "plan", Plan(self.plan, self.how))
 
     @property
     def solved(self) -> bool:
         return self.status is Status.SOLVED
+
+    def reversed(self) -> Plan:
+        """The plan backwards, each motion inverted: how to put together what the plan takes apart.
+
+        Raises:
+            InputError: there is no plan.
+        """
+        if self.plan is None:
+            raise InputError(f"Expected a result with a plan to reverse; got {self.status.name}.")
+        return self.plan.reversed()
 
 
 class SearchLog(Generic[S]):
@@ -152,6 +199,7 @@ class SearchLog(Generic[S]):
         self.expansions = 0
         self.iterations = 0
         self.best_prefix: tuple[int, ...] = ()
+        self.all_proved = True  # whether every refusal so far was certain
         self._refusals: list[tuple[tuple[int, ...], int, Rejection]] = []
         self._start = time.perf_counter()
 
@@ -180,6 +228,7 @@ class SearchLog(Generic[S]):
         answer = self.problem.attempt(state, action)
         if isinstance(answer, Rejection):
             self.iterations += 1
+            self.all_proved = self.all_proved and answer.proved
             if len(self._refusals) < MAX_BLAME:
                 self._refusals.append((prefix, action, answer))
         elif len(prefix) >= len(self.best_prefix):
@@ -208,7 +257,12 @@ class SearchLog(Generic[S]):
         return self._result(Status.SOLVED, tuple(plan), tuple(how), cost, first_guess_failed)
 
     def failed(self, status: Status, *, first_guess_failed: bool | None = None) -> PlanResult:
-        """The result for a search that ended without a plan."""
+        """The result for a search that ended without a plan.
+
+        What was refused without proof leaves nothing proved: UNSOLVABLE then becomes GAVE_UP.
+        """
+        if status is Status.UNSOLVABLE and not self.all_proved:
+            status = Status.GAVE_UP
         return self._result(status, None, (), None, first_guess_failed)
 
     def _result(
@@ -223,7 +277,7 @@ class SearchLog(Generic[S]):
         blame = tuple(Refusal(self.names(p), names[a], r.reason, r.because) for p, a, r in self._refusals)
         return PlanResult(
             status=status,
-            plan=None if plan is None else self.names(plan),
+            plan=None if plan is None else Plan(self.names(plan), how),
             iterations=self.iterations,
             expansions=self.expansions,
             attempts=self.attempts,

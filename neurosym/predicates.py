@@ -12,6 +12,8 @@ parts also return must pass ``removal=False``.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
 
 from numpy.typing import ArrayLike
 
@@ -22,6 +24,8 @@ from neurosym.geometry.sweep import exits_along
 from neurosym.language.state import State
 from neurosym.language.terms import Atom, Derived, Fluent, Type
 from neurosym.problem import Verdict
+from neurosym.ways import Way
+from neurosym.why_not import listed
 
 
 def free(
@@ -102,33 +106,66 @@ def supported(present: Fluent, *, removal: bool = True) -> Derived:
     return Derived("supported", [part], ask)
 
 
-def stable_without(present: Fluent, *, removal: bool = True) -> Derived:
-    """``stable_without(p)``: the parts present other than p stand still under gravity, friction included."""
+def stable_without(present: Fluent, *, removal: bool = True, held: int = 0) -> Derived:
+    """``stable_without(p)``: the parts present other than p stand still under gravity, friction included.
+
+    Args:
+        present: the fluent, of one part, that says which parts are there.
+        removal: parts that left do not come back, so that a verdict may promise.
+        held: how many of the others may be held meanwhile; with any, `how` is a `Way` that says which, and nothing is
+            promised.
+    """
     part = _part_type(present)
 
     def ask(world: Assembly, state: State, p: str) -> Verdict:
-        stability = world.stability()
-        there = state.mask(present, world.names)
-        rest = there & ~(1 << world.index[p])
-        answer = stability.standing(rest)
-        if answer.stands:
-            return Verdict(True, (), f"The others stand without {p}.")
-        falling = world.in_mask(answer.moving)
-        losing = [
-            f"{name} loses {p}"
-            for name in falling
-            if stability.touching[world.index[name]] >> world.index[p] & 1
-        ]
-        said = f"Without {p}, {_and(falling)} would fall" + (f" ({'; '.join(losing)})." if losing else ".")
-        # The motion stays possible while every part that moves in it is there, whatever else has left.
-        until = tuple(Atom(present, (n,)) for n in falling) if removal else None
-        return Verdict(False, falling, said, until)
+        rest = state.mask(present, world.names) & ~(1 << world.index[p])
+        return stands(world, rest, (p,), present if removal and not held else None, held)
 
-    return Derived("stable_without", [part], ask)
+    def check(world: Assembly, state: State, how: Any, p: str) -> Verdict:
+        hands = how.held if isinstance(how, Way) else ()
+        if len(hands) > held or p in hands:
+            return Verdict(False, hands, f"Step {p}: expected at most {held} of the others to be held; got {hands}.")
+        rest = state.mask(present, world.names) & ~(1 << world.index[p])
+        if world.stability().standing(rest, held=world.mask(hands)).stands:
+            return Verdict(True, (), f"The others stand without {p}.", how=how)
+        return ask(world, state, p) if not hands else _falls(world, world.stability().standing(rest).moving, (p,), held)
+
+    return Derived("stable_without", [part], ask, check=check)
 
 
-def _and(names: Sequence[str]) -> str:
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+def stands(world: Assembly, rest: int, leaving: Sequence[str], present: Fluent | None = None, held: int = 0) -> Verdict:
+    """Whether the parts in the bitset `rest` stand once those in `leaving` are gone.
+
+    Args:
+        present: the fluent that says which parts are there, for a verdict that promises; None promises nothing.
+        held: how many may be held.
+    """
+    said = ", ".join(leaving)
+    answer = world.stability().standing_when_held(rest, held) if held else world.stability().standing(rest)
+    if answer.stands:
+        how = Way(held=world.in_mask(answer.held)) if answer.held else None
+        return Verdict(True, (), f"The others stand without {said}.", how=how)
+    verdict = _falls(world, answer.moving, leaving, held)
+    # The motion stays possible while every part that moves in it is there, whatever else has left.
+    until = None if present is None else tuple(Atom(present, (n,)) for n in verdict.because)
+    return replace(verdict, until=until)
+
+
+def _falls(world: Assembly, moving: int, leaving: Sequence[str], held: int) -> Verdict:
+    falling = world.in_mask(moving)
+    lost = losses(world, moving, world.mask(leaving))
+    said = f"Without {listed(leaving)}, {listed(falling)} would fall"
+    if held:
+        said += f", whichever {'part' if held == 1 else f'{held} parts'} one holds"
+    if lost:
+        said += f" ({listed([f'{a} loses {b}' for a, b in lost])})"
+    return Verdict(False, falling, f"{said}.")
+
+
+def losses(world: Assembly, falling: int, leaving: int) -> tuple[tuple[str, str], ...]:
+    """Pairs of names (a, b): a is one of `falling` and touches b, one of `leaving` (bitsets of parts)."""
+    touching = world.stability().touching
+    return tuple((world.names[a], b) for a in bits(falling) for b in world.in_mask(touching[a] & leaving))
 
 
 def _part_type(present: Fluent) -> Type:

@@ -31,6 +31,8 @@ class Verdict:
         unconditional: a stronger promise: the verdict does not depend on the rest of the state. It does not hold in
             any state in which the atoms of `until` are as they are now, whether or not it comes after this one.
         how: for a verdict that holds, how the action may be done (a direction, a path), kept in the plan.
+        proved: for a verdict that does not hold, whether that is certain. A search for a path that ended without one
+            proves nothing: what rests on it is given up, never called impossible. It can promise nothing either.
     """
 
     holds: bool
@@ -39,6 +41,7 @@ class Verdict:
     until: tuple[Atom, ...] | None = None
     how: Any = None
     unconditional: bool = False
+    proved: bool = True
 
     def __bool__(self) -> bool:
         return self.holds
@@ -64,12 +67,15 @@ class Rejection:
             names itself. Planners prune by it, so it must be sound.
         unconditional: the promise holds in every state of the problem before one of `until` is done, not only in
             those reached from this one: what was learned in one branch of a search serves in all.
+        proved: whether the action is impossible for certain. A planner that met a refusal which is not must not call
+            a problem unsolvable (`SearchLog.failed` sees to it).
     """
 
     reason: str
     because: tuple[str, ...] = ()
     until: tuple[int, ...] = ()
     unconditional: bool = False
+    proved: bool = True
 
 
 class SearchProblem(Protocol[S]):

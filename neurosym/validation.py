@@ -36,16 +36,23 @@ class Validation:
         return self.ok
 
 
-def validate(problem: Problem, order: Sequence[str]) -> Validation:
+def validate(problem: Problem, order: Sequence[str], how: Sequence[Any] = ()) -> Validation:
     """Replay an order, given as names of action primitives (for Soma the pieces' letters).
+
+    Args:
+        how: one entry a step, as `PlanResult.how` has them: then each step must be possible in this way. Empty: in
+            any way.
 
     Raises:
         UnknownNameError: a name that is no action of the problem's domain.
+        InputError: not one `how` a step.
     """
     if not hasattr(problem, "domain"):
         raise InputError(f"Expected a Problem, as Domain.problem makes it; got {problem!r}.")
     if not isinstance(order, Sequence):
         raise InputError(f"Expected an order as a list of names of action primitives; got {order!r}.")
+    if len(how) not in (0, len(order)):
+        raise InputError(f"Expected one `how` a step, {len(order)} in all, or none; got {len(how)}.")
     ground = {}
     for action in problem.domain.actions:
         for binding in problem.bindings(action):
@@ -53,15 +60,21 @@ def validate(problem: Problem, order: Sequence[str]) -> Validation:
     for name in order:
         if not isinstance(name, str) or name not in ground:
             raise UnknownNameError("action primitive", name, ground)
+    if problem.rules is not None:
+        return problem.rules.replay(problem, order, how)
     world = problem.world.afresh() if hasattr(problem.world, "afresh") else problem.world
     state = AtomSet(set(problem.init), tuple(problem.type_of))
     done: list[str] = []
     possible = set(problem.actions)
 
-    def failure(literals: Sequence[Literal]) -> tuple[tuple[str, ...], str] | None:
+    def failure(literals: Sequence[Literal], way: Any = None) -> tuple[tuple[str, ...], str] | None:
         for literal in sorted(literals, key=lambda x: isinstance(x.atom.predicate, Derived)):
-            if isinstance(literal.atom.predicate, Derived):
-                verdict = literal.atom.predicate.function(world, state, *literal.atom.args)
+            predicate = literal.atom.predicate
+            if isinstance(predicate, Derived):
+                if way is not None and predicate.check is not None:
+                    verdict = predicate.check(world, state, way, *literal.atom.args)
+                else:
+                    verdict = predicate.function(world, state, *literal.atom.args)
                 if verdict.holds is not literal.positive:
                     return verdict.because, verdict.reason or f"{literal} is not true."
             elif state.holds(literal.atom) is not literal.positive:
@@ -79,7 +92,7 @@ def validate(problem: Problem, order: Sequence[str]) -> Validation:
             if then == name and first in possible and first not in done:
                 return Validation(False, step, (first,), f"{name} may be done only after {first}.")
         action, binding = ground[name]
-        wrong = failure([p.bind(binding) for p in action.pre])
+        wrong = failure([p.bind(binding) for p in action.pre], how[step] if how else None)
         if wrong is not None:
             return Validation(False, step, wrong[0], f"Step {step}, {name}: {wrong[1]}")
         effects = [e.bind(binding) for e in action.eff]

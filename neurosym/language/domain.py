@@ -7,7 +7,7 @@ import itertools
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 from typing import Literal as OneOf
 
 import networkx as nx
@@ -21,6 +21,10 @@ from neurosym.language.terms import Atom, Condition, Derived, Fluent, Literal, T
 if TYPE_CHECKING:
     from neurosym.language.grounding import GroundProblem
     from neurosym.motions import Staging
+    from neurosym.planner import PlanResult
+    from neurosym.problem import SearchProblem
+    from neurosym.validation import Validation
+    from neurosym.why_not import WhyNot
 
 #: More ground actions than this are refused: the definition wants a static fluent that narrows its parameters.
 MAX_GROUND_ACTIONS = 1_000_000
@@ -39,6 +43,21 @@ class Simulation:
     bodies: OneOf["cubes", "rigid"]
     removes: Mapping[str, str]
     absent: tuple[str, ...] = ()
+
+
+class Rules(Protocol):
+    """What a problem brings where the language cannot say what an action changes: its own states, and their replay.
+
+    The language still names the actions, their precedence and the goal.
+    """
+
+    def search(self, symbols: GroundProblem) -> SearchProblem[Any]:
+        """What planners see, made from the grounded symbols."""
+        ...
+
+    def replay(self, problem: Problem, order: Sequence[str], how: Sequence[Any]) -> Validation:
+        """See `neurosym.validation.validate`: shares no table with `search`, and asks the world afresh."""
+        ...
 
 
 class Domain:
@@ -84,6 +103,8 @@ class Domain:
         simulation: Simulation | None = None,
         stage: Callable[[Sequence[str], Sequence[Any]], Staging] | None = None,
         details: Mapping[str, Any] | None = None,
+        rules: Rules | None = None,
+        explain: Callable[[PlanResult], WhyNot | None] | None = None,
     ) -> Problem:
         """A problem of this domain, checked.
 
@@ -101,6 +122,8 @@ class Domain:
             stage: what a plan (names of actions, and `PlanResult.how`) does to parts in space, for pictures and
                 replays; None: each action takes away the part that `simulation` names.
             details: whatever the family wants to remember.
+            rules: what an action changes, where effects on fluents cannot say it.
+            explain: why a result has no plan, as data.
 
         Raises:
             DefinitionError: with the place of the mistake: an unknown object, a wrong type, a goal that no
@@ -120,6 +143,8 @@ class Domain:
             simulation=simulation,
             stage=stage,
             details=dict(details or {}),
+            rules=rules,
+            explain=explain,
         )
         problem.ground()
         return problem
@@ -145,6 +170,8 @@ class Problem:
     simulation: Simulation | None = None
     stage: Callable[[Sequence[str], Sequence[Any]], Staging] | None = None
     details: Mapping[str, Any] = field(default_factory=dict)
+    rules: Rules | None = None
+    explain: Callable[[PlanResult], WhyNot | None] | None = None
 
     def __post_init__(self) -> None:
         place = f"problem {self.name!r} of domain {self.domain.name!r}"
@@ -212,24 +239,29 @@ class Problem:
         return (dict(zip(names, objects)) for objects in itertools.product(*domains))
 
     @cached_property
-    def _grounded(self) -> GroundProblem:
+    def symbols(self) -> GroundProblem:
+        """The symbols as bitsets. Done once."""
         from neurosym.language.grounding import GroundProblem
 
         return GroundProblem(self)
 
-    def ground(self) -> GroundProblem:
+    @cached_property
+    def _searchable(self) -> SearchProblem[Any]:
+        return self.symbols if self.rules is None else self.rules.search(self.symbols)
+
+    def ground(self) -> SearchProblem[Any]:
         """The problem as planners see it. Done once."""
-        return self._grounded
+        return self._searchable
 
     @property
     def actions(self) -> tuple[str, ...]:
         """Names of the action primitives, in the order in which priors score them."""
-        return self.ground().actions
+        return self.symbols.actions
 
     @property
     def classes(self) -> tuple[int, ...]:
         """One integer an action primitive; equal ones are interchangeable."""
-        return self.ground().classes
+        return self.symbols.classes
 
     @cached_property
     def observation(self) -> NDArray[np.uint8] | None:

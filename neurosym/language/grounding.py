@@ -10,6 +10,7 @@ from neurosym.errors import ContractError, DefinitionError, UnknownNameError
 from neurosym.language.domain import check_precedence
 from neurosym.language.terms import Atom, Derived, Fluent, Literal
 from neurosym.problem import Rejection, Step, Verdict
+from neurosym.ways import Way
 
 if TYPE_CHECKING:
     from neurosym.language.domain import Problem
@@ -100,8 +101,10 @@ class GroundProblem:
             verdict = _ask(predicate, self.world, view, args)
             if verdict.holds is not positive:
                 return self._rejection(state, action, predicate, args, positive, verdict)
-            if how is None:
-                how = verdict.how
+            if how is None or verdict.how is None:
+                how = how or verdict.how
+            elif isinstance(how, Way) and isinstance(verdict.how, Way):
+                how = how.joined(verdict.how)
         return Step(self.apply(state, action), how)
 
     def apply(self, state: int, action: int) -> int:
@@ -127,6 +130,8 @@ class GroundProblem:
     ) -> Rejection:
         said = verdict.reason or f"{predicate}({', '.join(args)}) {'does not hold' if positive else 'holds'}."
         # A promise speaks of a verdict that stays false; it says nothing of one that must become false.
+        if not verdict.proved:
+            return Rejection(said, verdict.because, proved=False)
         if not positive or verdict.until is None:
             return Rejection(said, verdict.because, ())
         known = self._promises.get(verdict.until)

@@ -109,13 +109,26 @@ class Derived(_Predicate):
     """A predicate that is computed from the world and the state, not changed by effects.
 
     Its function takes the world, the state and the names of the objects, and answers with a `Verdict`.
+
+    Args:
+        check: for answers that are found by a search and say `how`: takes the world, the state, the `how` of a step and
+            the names of the objects, and answers whether it may be done so. Replays of a plan that says how ask it
+            instead of `function`: what was found once need not be found again, but must hold.
     """
 
-    __slots__ = ("function",)
+    __slots__ = ("check", "function")
 
-    def __init__(self, name: str, types: Sequence[Type], function: Callable[..., Verdict]) -> None:
+    def __init__(
+        self,
+        name: str,
+        types: Sequence[Type],
+        function: Callable[..., Verdict],
+        *,
+        check: Callable[..., Verdict] | None = None,
+    ) -> None:
         super().__init__(name, types)
         self.function = function
+        self.check = check
 
 
 def derived(*types: Type) -> Callable[[Callable[..., Verdict]], Derived]:

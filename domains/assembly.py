@@ -1,0 +1,172 @@
+"""Any assembly: take it apart, part by part or in groups, along straight lines or paths, with or without gravity.
+
+The plan of an assembly is that of its disassembly backwards (`PlanResult.reversed`): for rigid parts a removal
+reversed is an insertion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from domains.assembly_removal import apart_one_by_one
+from domains.assembly_samples import SAMPLES, TRAINING, sample
+from neurosym.errors import AssemblyError, InputError, UnknownNameError
+from neurosym.family import ProblemFamily
+from neurosym.geometry.assembly import NO_TABLE, Assembly
+from neurosym.geometry.directions import Directions, directions_for
+from neurosym.language import Domain, Problem
+from neurosym.language.domain import as_names
+
+#: What `paths` may be.
+PATHS = ("straight", "any")
+
+
+@dataclass(frozen=True)
+class Setting:
+    """How an assembly may be taken apart: the options of `AssemblyFamily.problem`, checked.
+
+    Attributes:
+        directions: float64 (k, 3) as tuples: unit vectors, in the order in which they are tried.
+        paths: one of `PATHS`.
+        groups: whether sub-assemblies may leave together.
+        gravity: whether what stays must stand.
+        held: how many parts may be held meanwhile.
+    """
+
+    directions: tuple[tuple[float, float, float], ...]
+    paths: str = "straight"
+    groups: bool = False
+    gravity: bool = True
+    held: int = 0
+
+
+class AssemblyFamily(ProblemFamily):
+    """Assemblies of a user's own: files, cells or meshes; and a few small samples, by number."""
+
+    name = "assembly"
+    reference = (
+        "Wilson and Latombe, Geometric reasoning about mechanical assembly (Artificial Intelligence 71, 1994): "
+        "directional blocking; Livesley (1978): stability by limit analysis"
+    )
+    domain: Domain
+
+    def __init__(self) -> None:
+        self.domain = self.problem(0).domain
+
+    def problem(
+        self,
+        given: Assembly | str | Path | int = 0,
+        *,
+        directions: Directions = "axes",
+        paths: str = "straight",
+        groups: bool = False,
+        gravity: bool = True,
+        held: int = 0,
+        fixed: Iterable[str] = (),
+        ground: float | bool | None = None,
+        before: Iterable[tuple[str, str]] = (),
+        units: str | None = None,
+        name: str = "",
+    ) -> Problem:
+        """Take an assembly apart: all parts that are not fixed are to be out.
+
+        Args:
+            given: an assembly, the path of one (`Assembly.load`), or the number of a sample.
+            directions: of straight removal: "axes", "contacts", a number of sampled ones, text such as "+z,-x", or
+                vectors (k, 3). They are tried in order.
+            paths: "straight" lines to infinity only, or "any": where none is free, a path is searched for. On
+                assemblies of cells that search is exact for all translations; on others it may end without an answer,
+                and a problem that rests on it is given up, never called unsolvable.
+            groups: whether parts may leave together, to be taken apart afterwards, in the hand and without gravity.
+            gravity: whether what stays must stand by itself, friction included.
+            held: how many of the parts that stay may be held meanwhile; any, and others at each step.
+            fixed: names of parts that stay and need no support, besides those that the assembly itself fixes.
+            ground: height of a plane under the parts (z, world), which nothing goes through; True: under the lowest
+                point; False: none; None: under the lowest point (or where the assembly has its table) with gravity,
+                none without.
+            before: pairs of names of parts: the first must leave before the second.
+            units: of the files' lengths, where the files do not say.
+            name: of the problem; default the file's, or the sample's.
+
+        Raises:
+            InputError: an option that is not one of those above, or an assembly of fixed parts only.
+            AssemblyError: parts that cannot be used, or that reach below the ground.
+        """
+        assembly, called = _assembly(given, units)
+        _check_options(paths, groups, gravity, held, ground)
+        assembly = assembly.with_fixed(dict.fromkeys((*assembly.fixed, *as_names(fixed, "fixed"))))
+        assembly = assembly.with_table(_table(assembly, gravity, ground))
+        if len(assembly.fixed) == len(assembly):
+            raise InputError(f"Expected a part that is not fixed, to take out; all {len(assembly)} are. Fix fewer.")
+        vectors = directions_for(assembly, directions)
+        setting = Setting(tuple(map(tuple, vectors.tolist())), paths, bool(groups), bool(gravity), int(held))
+        details = {
+            "directions": directions if isinstance(directions, str | int) else vectors.tolist(),
+            "ground": assembly.ground if assembly.has_table else None,
+            "fixed": list(assembly.fixed),
+            **{key: getattr(setting, key) for key in ("paths", "groups", "gravity", "held")},
+        }
+        return apart_one_by_one(
+            assembly, setting, before=before, name=name or called, family=self.name, details=details
+        )
+
+    def numbers(self, part: str = "test", *, split: int = 0) -> tuple[int, ...]:
+        """Numbers of the samples: see `domains.assembly_samples`."""
+        numbers = {"all": range(len(SAMPLES)), "train": range(TRAINING), "test": range(TRAINING, len(SAMPLES))}
+        if part not in numbers:
+            raise UnknownNameError("part", part, numbers)
+        return tuple(numbers[part])
+
+    def problems(self, part: str = "test", *, split: int = 0, **options: Any) -> list[Problem]:
+        """The samples of a part, with the options of `problem`."""
+        return [self.problem(n, **options) for n in self.numbers(part, split=split)]
+
+
+def _assembly(given: Assembly | str | Path | int, units: str | None) -> tuple[Assembly, str]:
+    """The assembly, and what to call it."""
+    if isinstance(given, Assembly):
+        return given, "assembly"
+    if isinstance(given, str | Path):
+        path = Path(given)
+        return Assembly.load(path, units=units), path.resolve().name
+    if isinstance(given, int | np.integer) and not isinstance(given, bool):
+        return sample(int(given))
+    raise InputError(f"Expected an Assembly, the path of one, or the number of a sample; got {given!r}.")
+
+
+def _check_options(paths: str, groups: bool, gravity: bool, held: int, ground: float | bool | None) -> None:
+    if paths not in PATHS:
+        raise UnknownNameError("kind of paths", paths, PATHS)
+    for what, value in (("groups", groups), ("gravity", gravity)):
+        if not isinstance(value, bool | np.bool_):
+            raise InputError(f"Expected {what} as True or False; got {value!r}.")
+    if isinstance(held, bool) or not isinstance(held, int | np.integer) or held < 0:
+        raise InputError(f"Expected held as a number of parts, 0 or more; got {held!r}.")
+    if held and not gravity:
+        raise InputError(f"Expected held=0 without gravity, where nothing falls; got {held}.")
+    if ground is not None and not (isinstance(ground, int | float | np.number) and np.isfinite(ground)):
+        raise InputError(f"Expected ground as a height, True, False or None; got {ground!r}.")
+
+
+def _table(assembly: Assembly, gravity: bool, ground: float | bool | None) -> float | None:
+    """Where the plane is, as `Assembly.with_table` takes it."""
+    if ground is None:
+        return assembly.table if gravity else NO_TABLE
+    if isinstance(ground, bool | np.bool_):
+        return None if ground else NO_TABLE
+    lowest = float(assembly.bounds[0, 2])
+    if ground > lowest + assembly.touch:
+        below = [n for n in assembly.names if _lowest(assembly, n) < ground - assembly.touch]
+        raise AssemblyError(
+            f"Expected parts on or above the ground at {ground:g}; {', '.join(below[:8])} reach down to {lowest:g}."
+        )
+    return float(ground)
+
+
+def _lowest(assembly: Assembly, name: str) -> float:
+    return float(assembly.body_bounds[assembly.owners == assembly.index[name], 0, 2].min())
