@@ -1,47 +1,98 @@
-"""What a study says: a page of Markdown, our figures beside the paper's."""
+"""What a study leaves behind: results.csv, figures, and a page of Markdown with ours beside the paper's."""
 
 from __future__ import annotations
 
-import os
-import platform
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from neurosym import __version__
 from neurosym.files import write_text
+from neurosym.findings import findings
+from neurosym.reporting import provenance
 from neurosym.reproduce import write_records
+from neurosym.study_figures import Drawn, write_figures
 from neurosym.study_results import Results
+
+_METRICS = {
+    "whole_sequence": "whole sequence",
+    "whole_sequence_seen": "whole, seen",
+    "whole_sequence_unseen": "whole, unseen",
+    "per_step": "per step",
+    "per_step_unseen": "per step, unseen",
+    "stop_accuracy": "stop accuracy",
+    "re_use": "re-use",
+    "training_seconds": "training s",
+}
+_BASELINES = {
+    "memoriser": "The memoriser is perfect on sequences that were demonstrated and guesses a random order of the right "
+    "length in others; these are expectations.",
+    "blind": "Blind is the best fixed answer, for each column the one that does best on the training demonstrations; "
+    "it looks at no picture.",
+}
 
 
 def write_results(results: Results, out: Path) -> None:
-    """Write results.csv and report.md into `out`."""
+    """Write results.csv, report.md, and the figures, each as PNG and SVG, into `out`."""
     write_records(results.records, out / "results.csv")
-    write_text(out / "report.md", report(results))
+    write_text(out / "report.md", report(results, write_figures(results, out)))
 
 
-def report(results: Results) -> str:
-    """A page of Markdown: means over seeds with their deviation, the paper's figures beside them."""
-    given = results.study
-    metrics = ["whole_sequence", "whole_sequence_seen", "whole_sequence_unseen", "per_step", "per_step_unseen"]
-    metrics += ["stop_accuracy", "re_use", "training_seconds"]
-    said = f"Mean over {given.seeds} seeds ± deviation; a sequence is seen when it, colours or letters, was trained on."
-    lines = [f"# {given.name}", "", said]
-    for style in given.pictures:
-        head = [given.what, "method", *(m.replace("_", " ") for m in metrics), "paper"]
-        lines += ["", f"## {style} pictures", "", f"| {' | '.join(head)} |", "|" + "---|" * len(head)]
-        for n in given.sizes:
-            for method in (*given.methods, *given.baselines):
-                row = [_mean(results.values(style, method, n, m)) for m in metrics]
-                paper = (given.published or {}).get(method, {})
-                beside = ", ".join(f"{m.replace('_', ' ')} {v:.2f}" for m, v in paper.items())
-                lines.append(f"| {n} | {method} | {' | '.join(row)} | {beside} |")
-    machine = f"Python {platform.python_version()}, {os.cpu_count()} processors"
-    return "\n".join([*lines, "", f"neurosym {__version__}, {machine}; seeds 0 to {given.seeds - 1}.", ""])
+def report(results: Results, drawn: Sequence[Drawn] = ()) -> str:
+    """A page of Markdown: what comes out, means over seeds with their deviation, the paper's figures beside them.
+
+    Args:
+        results: of all trials.
+        drawn: figures that lie beside the page; what is said of them.
+    """
+    study = results.study
+    seeds = f"Mean over {study.seeds} seeds ± deviation" if study.seeds > 1 else "One seed"
+    said = [
+        study.about,
+        f"{seeds}. A sequence of colours or letters is seen when it was trained on.",
+        *(_BASELINES[b] for b in study.baselines if b in _BASELINES),
+    ]
+    lines = [f"# {study.name}", "", " ".join(filter(None, said))]
+    for style in study.pictures:
+        lines += ["", f"## {study.name}: {style} pictures", "", *(f"* {s}" for s in findings(results, style)), ""]
+        lines += _table(results, style)
+    for figure in drawn:
+        if figure.shown:
+            lines += ["", f"![{figure.caption}]({figure.name}.png)"]
+    others = [f"[{figure.name}]({figure.name}.png)" for figure in drawn if not figure.shown]
+    if others:
+        lines += ["", f"Further figures: {', '.join(others)}."]
+    trained = f"seeds 0 to {study.seeds - 1}" if study.seeds > 1 else "seed 0"
+    return "\n".join([*lines, "", f"neurosym {__version__}, {trained}; {provenance()}", ""])
 
 
-def _mean(values: Sequence[float]) -> str:
+def _table(results: Results, style: str) -> list[str]:
+    study = results.study
+    rows = [*study.methods, *study.baselines]
+    asked = [m for m in _METRICS if m != "stop_accuracy" or results.lengths_vary]
+    metrics = [m for m in asked if any(results.values(style, r, n, m) for r in rows for n in study.sizes)]
+    head = [study.what, "method", *(_METRICS[m] for m in metrics)]
+    published = study.published or {}
+    head += ["paper: whole sequence", "paper: re-use"] if published else []
+    lines = [f"| {' | '.join(head)} |", "|" + "---|" * len(head)]
+    for n in study.sizes:
+        for method in rows:
+            row = [str(n), method]
+            row += [_spread(results.values(style, method, n, m), 1 if "seconds" in m else 3) for m in metrics]
+            if published:
+                row += _published(published.get(method, {}))
+            lines.append(f"| {' | '.join(row)} |")
+    return lines
+
+
+def _published(own: Mapping[str, float]) -> list[str]:
+    if not own:
+        return ["", ""]
+    return [f"{own['whole_sequence']:.2f} ± {own['whole_sequence_std']:.2f}", f"{own['re_use']:.2f}"]
+
+
+def _spread(values: Sequence[float], digits: int) -> str:
     if not values:
         return ""
-    return f"{np.mean(values):.2f}" + (f" ± {np.std(values):.2f}" if len(values) > 1 else "")
+    return f"{np.mean(values):.{digits}f}" + (f" ± {np.std(values):.{digits}f}" if len(values) > 1 else "")

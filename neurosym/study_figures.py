@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -32,26 +32,28 @@ LARGE = 10
 
 @dataclass(frozen=True)
 class Drawn:
-    """A figure: the name of its files without ending, and what it shows."""
+    """A figure: the name of its files without ending, what it shows, and whether the report shows it or only links."""
 
     name: str
     caption: str
     figure: Figure
+    shown: bool = True
 
 
 def figures(results: Results) -> Iterator[Drawn]:
-    """All figures of a study, drawn one at a time."""
+    """All figures of a study, drawn one at a time; of several styles of pictures the last is shown."""
     for style in results.study.pictures:
         for kind in results.study.figures:
-            yield from KINDS[kind](results, style)
+            for drawn in KINDS[kind](results, style):
+                yield replace(drawn, shown=drawn.shown and style == results.study.pictures[-1])
 
 
-def write_figures(results: Results, out: Path) -> list[tuple[str, str]]:
-    """Save each as PNG and SVG into `out`; returns (name of the PNG, caption)."""
+def write_figures(results: Results, out: Path) -> list[Drawn]:
+    """Save each as PNG and SVG into `out`; returns what was drawn."""
     written = []
     for drawn in figures(results):
-        png, _ = save_both(drawn.figure, out / drawn.name)
-        written.append((png.name, drawn.caption))
+        save_both(drawn.figure, out / drawn.name)
+        written.append(drawn)
     return written
 
 
@@ -61,12 +63,15 @@ def _shares(results: Results, style: str) -> Iterator[Drawn]:
     published = study.published or {}
 
     def panel(title: str, metric: str) -> Panel:
-        paper = {m: (figures[metric], figures.get(f"{metric}_std", 0.0)) for m, figures in published.items()
-                 if metric in figures}
+        paper = {m: (own[metric], own.get(f"{metric}_std", 0.0)) for m, own in published.items() if metric in own}
         return Panel(title, {row: results.values(style, row, n, metric) for row in rows}, paper)
 
-    metrics = {"whole_sequence": "whole\nsequence", "whole_sequence_unseen": "the same,\nunseen ones",
-               "per_step": "steps\nright", "re_use": "sequences\nwith re-use"}
+    metrics = {
+        "whole_sequence": "whole\nsequence",
+        "whole_sequence_unseen": "the same,\nunseen ones",
+        "per_step": "steps\nright",
+        "re_use": "sequences\nwith re-use",
+    }
     panels = [panel(title, metric) for metric, title in metrics.items()]
     figure = points_figure(_title(results, style, n), rows, panels)
     yield Drawn(f"shares-{style}", "Shares of test sequences, and of their steps, a row a method", figure)
@@ -85,8 +90,7 @@ def _curves(results: Results, style: str) -> Iterator[Drawn]:
     study = results.study
     rows = [*study.methods, *study.baselines]
     metrics = {"per_step": "steps right", "whole_sequence": "whole sequence"}
-    counted = _counts(results, style, max(study.sizes)).values()
-    if any((own.right.sum(axis=1) > 0).sum() > 1 for own in counted):
+    if results.lengths_vary:
         metrics["stop_accuracy"] = "length right"
     panels = [
         Curves(title, {m: {n: results.values(style, m, n, metric) for n in study.sizes} for m in rows})
@@ -111,7 +115,8 @@ def _confusion(results: Results, style: str) -> Iterator[Drawn]:
         return
     for method, own in counts.items():
         figure = confusion_figure(title, {method: own})
-        yield Drawn(f"confusion-{style}-{method}", f"What {method} read for what", figure)
+        shown = method == results.study.ours
+        yield Drawn(f"confusion-{style}-{method}", f"What {method} read for what", figure, shown)
 
 
 def _classes(results: Results, style: str) -> Iterator[Drawn]:
@@ -132,8 +137,11 @@ def _counts(results: Results, style: str, n: int) -> dict[str, Counts]:
 
 def _title(results: Results, style: str, n: int | None = None) -> str:
     study = results.study
-    tested = {int(own.right.sum()) // study.seeds for (s, _, size), own in results.counts.items() if s == style
-              and n in (None, size)}
+    tested = {
+        int(own.right.sum()) // study.seeds
+        for (pictures, _, size), own in results.counts.items()
+        if pictures == style and n in (None, size)
+    }
     given = "" if n is None else f"{n} {study.what}, "
     test = f"{max(tested):,} test pictures, " if tested else ""
     return f"{study.name}, {style} pictures\n{given}{test}{study.seeds} seed{'s' if study.seeds > 1 else ''}"

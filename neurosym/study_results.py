@@ -50,6 +50,11 @@ class Results:
         own = self.values(pictures, method, n, metric)
         return sum(own) / len(own) if own else None
 
+    @property
+    def lengths_vary(self) -> bool:
+        """Whether the test sequences differ in length, so that where to stop is a question."""
+        return any(int((own.right.sum(axis=1) > 0).sum()) > 1 for own in self.counts.values())
+
     @cached_property
     def _index(self) -> dict[tuple[str, str, int, str], list[float]]:
         index: dict[tuple[str, str, int, str], list[float]] = {}
