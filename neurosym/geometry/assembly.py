@@ -239,6 +239,21 @@ class Assembly:
         """Whether every body is a box."""
         return all(isinstance(b.shape, Box) for b in self.bodies)
 
+    @cached_property
+    def is_box(self) -> NDArray[np.bool_]:
+        """bool (n_bodies,): which bodies are boxes."""
+        return np.array([isinstance(b.shape, Box) for b in self.bodies])
+
+    @cached_property
+    def is_convex(self) -> NDArray[np.bool_]:
+        """bool (n_bodies,): which bodies are convex by their kind of shape."""
+        return np.array([not isinstance(b.shape, Mesh) for b in self.bodies])
+
+    @cached_property
+    def box_sizes(self) -> Array:
+        """float64 (n_bodies, 3): full edge lengths of the boxes, 0 for other bodies."""
+        return np.array([b.shape.size if isinstance(b.shape, Box) else np.zeros(3) for b in self.bodies])
+
     def body_vertices(self, body: int) -> Array:
         """float64 (n, 3): the vertices of a body, in the world."""
         X = self.X_WB[body]
@@ -248,11 +263,13 @@ class Assembly:
     @cached_property
     def body_bounds(self) -> Array:
         """float64 (n_bodies, 2, 3): axis-aligned bounds of the bodies, in the world."""
-        found = []
-        for i in range(len(self.bodies)):
-            vertices = self.body_vertices(i)
-            found.append((vertices.min(axis=0), vertices.max(axis=0)))
-        return np.array(found)
+        half = np.einsum("bij,bj->bi", np.abs(self.X_WB[:, :3, :3]), self.box_sizes / 2)
+        centres = self.X_WB[:, :3, 3]
+        found: Array = np.stack([centres - half, centres + half], axis=1)
+        for i in np.flatnonzero(~self.is_box):
+            vertices = self.body_vertices(int(i))
+            found[i] = vertices.min(axis=0), vertices.max(axis=0)
+        return found
 
     @cached_property
     def bounds(self) -> Array:
@@ -278,6 +295,11 @@ class Assembly:
     def touch(self) -> float:
         """The touching tolerance as a length."""
         return self.tolerances.touch * self.smallest_extent
+
+    @cached_property
+    def mate(self) -> float:
+        """The tolerance for overlaps at rest as a length."""
+        return max(self.touch, self.tolerances.mate * self.smallest_extent)
 
     @cached_property
     def axes(self) -> Array:

@@ -1,8 +1,9 @@
 """Where parts touch: points, normals and areas.
 
-Boxes: FCL finds the pairs and their normals, and their faces are clipped exactly. Anything else: coplanar facets
-with opposite normals are clipped, since FCL's depths and normals between meshes are not usable; FCL says which pairs
-are near at all.
+Bounds say which bodies are near. Two boxes with the same axes are compared as intervals; of all other pairs the
+triangles that lie in one plane, with opposite normals, are clipped against one another. Pairs that have none such,
+and of which FCL says that they touch all the same, touch where their faces nearly lie in one plane. All pairs are
+handled at once.
 """
 
 from __future__ import annotations
@@ -16,12 +17,14 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
 from neurosym.geometry import collision
-from neurosym.geometry.assembly import Box
+from neurosym.geometry.broad_phase import Pairs, overlapping_pairs, spans
+from neurosym.geometry.surfaces import Surfaces
 
 if TYPE_CHECKING:
     from neurosym.geometry.assembly import Assembly
 
 Array = NDArray[np.float64]
+Numbers = NDArray[np.int64]
 
 #: Stands for the table where a body is expected.
 TABLE = -1
@@ -46,101 +49,104 @@ class Contact:
 
 
 def find_contacts(assembly: Assembly) -> tuple[Contact, ...]:
-    """All contacts of an assembly, the table's among them."""
-    found = [*_table_contacts(assembly)]
-    touch = assembly.touch
-    shapes = [b.shape for b in assembly.bodies]
-    grown = [collision.shape_object(s, X, touch / 2) for s, X in zip(shapes, assembly.X_WB)]
-    for a, b in near_pairs(assembly.body_bounds, assembly.owners, touch):
-        if isinstance(shapes[a], Box) and isinstance(shapes[b], Box):
-            contact = _box_contact(assembly, a, b, grown[a], grown[b])
-            if contact is not None:
-                found.append(contact)
-        elif collision.collide(grown[a], grown[b]) or collision.distance(grown[a], grown[b]) <= touch:
-            found.extend(_facet_contacts(assembly, a, b))
-    return tuple(found)
+    """All contacts of an assembly, the table's first, then by bodies."""
+    bounds, touch = assembly.body_bounds, assembly.touch
+    near = overlapping_pairs(bounds[:, 0] - touch, bounds[:, 1] + touch, assembly.owners)
+    aligned = _same_axes(assembly, near)
+    found = _box_contacts(assembly, near[aligned])
+    others = near[~aligned]
+    if len(others):
+        found += _facet_contacts(assembly, others, assembly.tolerances.parallel, touch)
+        done = {(c.a, c.b) for c in found}
+        left = [(int(a), int(b)) for a, b in others if (a, b) not in done]
+        rounded = [pair for pair in left if _touching(assembly, *pair)]
+        if rounded:
+            found += _facet_contacts(assembly, np.array(rounded), assembly.tolerances.mate_angle, assembly.mate)
+    return tuple(_table_contacts(assembly) + sorted(found, key=lambda c: (c.a, c.b)))
 
 
-def near_pairs(bounds: Array, owners: NDArray[np.int64], margin: float) -> list[tuple[int, int]]:
+def _touching(assembly: Assembly, a: int, b: int) -> bool:
+    """Whether the surfaces of two bodies come within the touching tolerance, by FCL."""
+    objects = assembly.remember("collision objects", lambda: dict[int, object]())
+    for body in (a, b):
+        if body not in objects:
+            objects[body] = collision.shape_object(assembly.bodies[body].shape, assembly.X_WB[body])
+    first, second = objects[a], objects[b]
+    return collision.collide(first, second) or collision.distance(first, second) <= assembly.touch
+
+
+def near_pairs(bounds: Array, owners: Numbers, margin: float) -> list[tuple[int, int]]:
     """Pairs a < b of bodies of different parts whose bounds (n, 2, 3) come within `margin`."""
-    low, high = bounds[:, 0] - margin, bounds[:, 1] + margin
-    near = (low[:, None] <= high[None]).all(axis=2)
-    near &= near.T & (owners[:, None] != owners[None])
-    return [(int(a), int(b)) for a, b in np.argwhere(np.triu(near, 1))]
+    pairs = overlapping_pairs(bounds[:, 0] - margin, bounds[:, 1] + margin, owners)
+    return [(int(a), int(b)) for a, b in pairs]
 
 
-def _box_contact(assembly: Assembly, a: int, b: int, grown_a: object, grown_b: object) -> Contact | None:
-    """FCL finds the pair and the normal; the two faces are clipped here, for FCL keeps four of up to eight corners."""
-    patch = collision.box_patch(grown_a, grown_b)
-    if patch is None:
-        return None
-    normal = patch[1]
-    faces = [_face_along(assembly, body, sign * normal) for body, sign in ((a, 1.0), (b, -1.0))]
-    first, second = faces
-    if first is None or second is None:
-        return None  # an edge or a corner, not a face
-    (corner_a, u, v, size_a), (corner_b, ub, vb, size_b) = first, second
-    normal = np.cross(u, v)
-    delta = corner_b - corner_a
-    if abs(delta @ normal) > assembly.touch:
-        return None
-    # The other face in this face's frame: an interval along each axis where they are parallel, clipped otherwise.
-    square = np.array([[0, 0], [size_b[0], 0], size_b, [0, size_b[1]]]) @ np.array([ub, vb]) + delta
-    flat = np.stack([square @ u, square @ v], axis=1)
-    if min(np.abs([ub @ u, ub @ v])) <= assembly.tolerances.parallel:
-        low, high = np.maximum(flat.min(axis=0), 0.0), np.minimum(flat.max(axis=0), size_a)
-        if (high - low).min() <= assembly.touch:
-            return None
-        uv = np.array([low, [high[0], low[1]], high, [low[0], high[1]]])
-    else:
-        both = shapely.intersection(shapely.box(0, 0, *size_a), shapely.Polygon(flat))
-        uv = shapely.get_coordinates(both)[:-1]
-        if len(uv) < 3:
-            return None
-    points = corner_a + uv[:, :1] * u + uv[:, 1:] * v
-    return _contact(a, b, points, normal, assembly.touch)
+def _same_axes(assembly: Assembly, pairs: Pairs) -> NDArray[np.bool_]:
+    """Which pairs are two boxes with parallel axes, bool (k,)."""
+    boxes = assembly.is_box[pairs].all(axis=1)
+    R = assembly.X_WB[:, :3, :3]
+    sines = np.sort(np.abs(np.swapaxes(R[pairs[:, 0]], 1, 2) @ R[pairs[:, 1]]), axis=2)[:, :, :2]
+    parallel = np.linalg.norm(sines, axis=2).max(axis=1, initial=0.0) <= assembly.tolerances.parallel
+    return np.asarray(boxes & parallel)
 
 
-def _face_along(assembly: Assembly, body: int, normal: Array) -> tuple[Array, Array, Array, Array] | None:
-    """The face of a box whose outward normal is `normal`: a corner, two unit edges (u x v outward), their lengths."""
-    shape = assembly.bodies[body].shape
-    assert isinstance(shape, Box)
-    X = assembly.X_WB[body]
-    along = X[:3, :3].T @ normal
-    axis = int(np.argmax(np.abs(along)))
-    if np.linalg.norm(np.delete(along, axis)) > 10 * assembly.tolerances.parallel:
-        return None
-    sign = float(np.sign(along[axis]))
-    second, third = (axis + 1) % 3, (axis + 2) % 3
-    if sign < 0:
-        second, third = third, second
-    local = np.zeros(3)
-    local[axis] = sign * shape.size[axis] / 2
-    local[second], local[third] = -shape.size[second] / 2, -shape.size[third] / 2
-    u, v = X[:3, second], X[:3, third]
-    return X[:3, :3] @ local + X[:3, 3], u, v, np.array([shape.size[second], shape.size[third]])
-
-
-def _contact(a: int, b: int, points: Array, normal: Array, touch: float) -> Contact | None:
-    centre = points.mean(axis=0)
-    following = np.roll(points, -1, axis=0)
-    area = 0.5 * abs(float(np.cross(points - centre, following - centre).sum(axis=0) @ normal))
-    width = area / max(float(np.linalg.norm(np.ptp(points, axis=0))), 1e-300)
-    return Contact(a, b, points, normal, area) if width > touch else None
+def _box_contacts(assembly: Assembly, pairs: Pairs) -> list[Contact]:
+    """Contacts of boxes with parallel axes, pairs (k, 2): in the first box's frame all is intervals."""
+    if not len(pairs):
+        return []
+    touch = assembly.touch
+    a, b = pairs.T
+    X = assembly.X_WB
+    R = X[a, :3, :3]
+    across = np.swapaxes(R, 1, 2)
+    half_a = assembly.box_sizes[a] / 2
+    half_b = np.einsum("kij,kj->ki", np.abs(across @ X[b, :3, :3]).round(), assembly.box_sizes[b]) / 2
+    centre = np.einsum("kij,kj->ki", across, X[b, :3, 3] - X[a, :3, 3])
+    low, high = np.maximum(-half_a, centre - half_b), np.minimum(half_a, centre + half_b)
+    overlap = high - low
+    flat = overlap <= assembly.mate
+    axis = flat.argmax(axis=1)
+    found = []
+    for k in np.flatnonzero((flat.sum(axis=1) == 1) & (overlap >= -touch).all(axis=1)):
+        n = int(axis[k])
+        u, v = (n + 1) % 3, (n + 2) % 3
+        sign = 1.0 if centre[k, n] > 0 else -1.0
+        corners = np.zeros((4, 3))
+        corners[:, n] = sign * half_a[k, n]
+        corners[:, u] = low[k, u], high[k, u], high[k, u], low[k, u]
+        corners[:, v] = low[k, v], low[k, v], high[k, v], high[k, v]
+        points = corners @ R[k].T + X[a[k], :3, 3]
+        area = float(overlap[k, u] * overlap[k, v])
+        found.append(Contact(int(a[k]), int(b[k]), points, sign * R[k, :, n], area))
+    return found
 
 
 def _table_contacts(assembly: Assembly) -> list[Contact]:
-    found: list[Contact] = []
-    for i in range(len(assembly.bodies) if assembly.has_table else 0):
-        if assembly.body_bounds[i, 0, 2] > assembly.ground + assembly.touch:
-            continue
-        vertices = assembly.body_vertices(i)
-        low = vertices[vertices[:, 2] <= assembly.ground + assembly.touch]
-        points = hull_points(low, np.array([0.0, 0.0, -1.0]))
-        contact = None if len(points) < 3 else _contact(i, TABLE, points, np.array([0.0, 0.0, -1.0]), assembly.touch)
-        if contact is not None:
-            found.append(contact)
+    if not assembly.has_table:
+        return []
+    down = np.array([0.0, 0.0, -1.0])
+    reach = assembly.ground + assembly.touch
+    found = []
+    for i in np.flatnonzero(assembly.body_bounds[:, 0, 2] <= reach):
+        vertices = assembly.body_vertices(int(i))
+        points = hull_points(vertices[vertices[:, 2] <= reach], down)
+        area = _area(points, down)
+        if _is_wide(points, area, assembly.touch):
+            found.append(Contact(int(i), TABLE, points, down, area))
     return found
+
+
+def _area(points: Array, normal: Array) -> float:
+    """Area of a convex polygon with corners (k, 3) in order."""
+    if len(points) < 3:
+        return 0.0
+    arms = points - points.mean(axis=0)
+    return 0.5 * abs(float(np.cross(arms, np.roll(arms, -1, axis=0)).sum(axis=0) @ normal))
+
+
+def _is_wide(points: Array, area: float, touch: float) -> bool:
+    """Whether a patch is wider than the tolerance: edges and corners that meet are no contact."""
+    return len(points) >= 3 and area > touch * float(np.linalg.norm(np.ptp(points, axis=0)))
 
 
 def hull_points(points: Array, normal: Array) -> Array:
@@ -164,54 +170,89 @@ def plane_axes(normal: Array) -> tuple[Array, Array]:
     return u, np.cross(normal, u)
 
 
-def _facet_contacts(assembly: Assembly, a: int, b: int) -> list[Contact]:
-    """Contacts between two bodies by clipping coplanar triangles with opposite normals, gathered by plane."""
-    tol, touch = assembly.tolerances, assembly.touch
-    triangles = [assembly.body_vertices(i)[assembly.bodies[i].shape.faces] for i in (a, b)]
-    normals = []
-    for k, t in enumerate(triangles):
-        cross = np.cross(t[:, 1] - t[:, 0], t[:, 2] - t[:, 0])
-        size = np.linalg.norm(cross, axis=1)
-        keep = size > 1e-12 * assembly.smallest_extent**2
-        triangles[k] = t[keep]
-        normals.append(cross[keep] / size[keep, None])
-    ta, tb = triangles
-    na, nb = normals
-    # Opposite, by the sine of the angle between them, and in one plane.
-    opposite = (na @ nb.T < 0) & (np.linalg.norm(np.cross(na[:, None], nb[None]), axis=2) <= tol.parallel)
-    gap = np.abs(np.einsum("id,ijd->ij", na, tb.mean(axis=1)[None] - ta.mean(axis=1)[:, None]))
-    pairs = np.argwhere(opposite & (gap <= touch))
+def _facet_contacts(assembly: Assembly, pairs: Pairs, sine: float, gap: float) -> list[Contact]:
+    """Contacts of bodies by clipping triangles that face one another, all pairs (k, 2) at once.
+
+    Args:
+        sine: of the angle up to which normals count as opposite.
+        gap: how far apart (length) the faces may be; an overlap may be as deep as `tolerances.mate` says.
+    """
+    surfaces = Surfaces.of(assembly)
+    i, j = _facing(assembly, surfaces, pairs, sine, gap).T
+    planes = _planes(assembly, surfaces, i, j, max(sine, 1e-3))
+    if not planes:
+        return []
+    number = np.repeat(np.arange(len(planes)), [len(members) for members in planes])
+    i, j = (t[np.concatenate(planes)] for t in (i, j))
+    starts = np.flatnonzero(np.diff(number, prepend=-1))
+    origins = surfaces.middles[i[starts]]
+    normals = np.add.reduceat(surfaces.normals[i] - surfaces.normals[j], starts)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    axes = np.array([np.stack(plane_axes(n), axis=1) for n in normals])  # (planes, 3, 2)
+    shadows = [(surfaces.triangles[t] - origins[number][:, None]) @ axes[number] for t in (i, j)]
+    clipped = shapely.intersection(*map(shapely.polygons, shadows))
+    areas = shapely.area(clipped)
+    kept = np.flatnonzero(areas > 0)
+    number, clipped, areas = number[kept], clipped[kept], areas[kept]
+    # Where a line along the normal, through the middle of the patch, meets one plane and the other.
+    middle = origins[number] + np.einsum("kde,ke->kd", axes[number], shapely.get_coordinates(shapely.centroid(clipped)))
+    heights = [
+        np.einsum("kd,kd->k", surfaces.normals[t], surfaces.middles[t] - middle)
+        / np.einsum("kd,kd->k", surfaces.normals[t], normals[number])
+        for t in (i[kept], j[kept])
+    ]
+    apart = heights[1] - heights[0]
+    near = (apart <= gap) & (apart >= -assembly.mate)
+    number, clipped, areas = number[near], clipped[near], areas[near]
+    total = np.bincount(number, areas, len(planes))
+    uv, source = shapely.get_coordinates(clipped, return_index=True)
     found = []
-    for plane in _by_plane(na, ta, pairs, assembly):
-        normal = na[plane[0, 0]]
-        u, v = plane_axes(normal)
-        flat_a = shapely.polygons(np.stack([ta[plane[:, 0]] @ u, ta[plane[:, 0]] @ v], axis=-1))
-        flat_b = shapely.polygons(np.stack([tb[plane[:, 1]] @ u, tb[plane[:, 1]] @ v], axis=-1))
-        clipped = shapely.intersection(flat_a, flat_b)
-        area = float(shapely.area(clipped).sum())
-        uv = shapely.get_coordinates(clipped[shapely.area(clipped) > 0])
-        if len(uv) < 3:
-            continue
-        offset = float(ta[plane[0, 0]].mean(axis=0) @ normal)
-        points = hull_points(uv[:, :1] * u + uv[:, 1:] * v + offset * normal, normal)
-        contact = None if len(points) < 3 else _contact(a, b, points, normal, touch)
-        if contact is not None:
-            found.append(Contact(a, b, points, normal, area))
+    for k, corners in _hulls(uv, number[source], 1e-2 * assembly.touch):
+        points = origins[k] + corners @ axes[k].T
+        if _is_wide(points, _area(points, normals[k]), assembly.touch):
+            a, b = surfaces.body[i[starts[k]]], surfaces.body[j[starts[k]]]
+            found.append(Contact(int(a), int(b), points, normals[k], float(total[k])))
     return found
 
 
-def _by_plane(
-    normals: Array, triangles: Array, pairs: NDArray[np.int64], assembly: Assembly
-) -> list[NDArray[np.int64]]:
-    """Pairs of facets grouped by the plane of their first facet."""
-    groups: list[tuple[Array, float, list[NDArray[np.int64]]]] = []
-    for pair in pairs:
-        normal = normals[pair[0]]
-        offset = float(triangles[pair[0]].mean(axis=0) @ normal)
-        for known, distance, members in groups:
-            if known @ normal > 1 - 1e-6 and abs(distance - offset) <= 2 * assembly.touch:
-                members.append(pair)
-                break
-        else:
-            groups.append((normal, offset, [pair]))
-    return [np.array(members) for _, _, members in groups]
+def _facing(assembly: Assembly, surfaces: Surfaces, pairs: Pairs, sine: float, gap: float) -> Pairs:
+    """Pairs of triangles, the first of the lower body, that are near and face each other, int64 (k, 2)."""
+    # Only what reaches into the bounds of the other body of a pair can touch it.
+    ways = np.concatenate([pairs, pairs[:, ::-1]])
+    run, place = spans(np.diff(surfaces.first)[ways[:, 0]])
+    candidate = surfaces.first[ways[run, 0]] + place
+    bounds = assembly.body_bounds[ways[run, 1]]
+    low, high = surfaces.triangles.min(axis=1) - gap, surfaces.triangles.max(axis=1) + gap
+    inside = (low[candidate] <= bounds[:, 1]).all(axis=1) & (high[candidate] >= bounds[:, 0]).all(axis=1)
+    near = np.unique(candidate[inside])
+    i, j = near[overlapping_pairs(low[near], high[near], assembly.owners[surfaces.body[near]])].T
+    n = len(assembly.bodies)
+    kept = np.isin(surfaces.body[i] * n + surfaces.body[j], pairs[:, 0] * n + pairs[:, 1])
+    kept &= np.einsum("kd,kd->k", surfaces.normals[i], surfaces.normals[j]) < 0
+    kept &= np.linalg.norm(np.cross(surfaces.normals[i], surfaces.normals[j]), axis=1) <= sine
+    return np.stack([i[kept], j[kept]], axis=1)
+
+
+def _planes(assembly: Assembly, surfaces: Surfaces, i: Numbers, j: Numbers, sine: float) -> list[Numbers]:
+    """Facing pairs of triangles gathered by pair of bodies and, in it, by the plane of the first triangle."""
+    points, normals = surfaces.middles[i], surfaces.normals[i]
+    keys = surfaces.body[i] * len(assembly.bodies) + surfaces.body[j]
+    order = np.argsort(keys, kind="stable")
+    found = []
+    for left in np.split(order, np.flatnonzero(np.diff(keys[order])) + 1):
+        while len(left):
+            same = normals[left] @ normals[left[0]] > 1 - sine**2 / 2
+            same &= np.abs((points[left] - points[left[0]]) @ normals[left[0]]) <= 2 * assembly.mate
+            found.append(left[same])
+            left = left[~same]
+    return found
+
+
+def _hulls(uv: Array, group: Numbers, noise: float) -> list[tuple[int, Array]]:
+    """Corners of the convex hull of each group of points in the plane; those less than `noise` off an edge go."""
+    if not len(uv):
+        return []
+    order = np.argsort(group, kind="stable")
+    present, number = np.unique(group[order], return_inverse=True)
+    hulls = shapely.simplify(shapely.convex_hull(shapely.multipoints(uv[order], indices=number)), noise)
+    return [(int(k), shapely.get_coordinates(h)[:-1]) for k, h in zip(present, hulls) if h.geom_type == "Polygon"]
