@@ -11,10 +11,11 @@ import json
 import os
 import platform
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -22,7 +23,7 @@ import numpy as np
 from neurosym import __version__, benchmark
 from neurosym.benchmark import Comparison, Outcome, Run
 from neurosym.engines import connection, cores, run_tasks
-from neurosym.errors import InputError
+from neurosym.errors import InputError, UnknownNameError
 from neurosym.family import Progress
 from neurosym.files import write_text, written_whole
 from neurosym.registry import load_domain, load_prior
@@ -60,6 +61,21 @@ class Experiment:
     def __post_init__(self) -> None:
         if self.splits < 1 or not (self.styles and self.methods and self.planners):
             raise InputError("Expected at least one split, style, method and planner; got none of one.")
+
+
+#: The paper splits the cubes 100 times.
+SCALES: Mapping[str, Mapping[str, Any]] = MappingProxyType({"quick": {"splits": 3}, "paper": {"splits": 100}})
+
+
+def soma_experiment(scale: str = "quick") -> Experiment:
+    """The paper's Table II: change it with `dataclasses.replace`.
+
+    Args:
+        scale: ``"quick"``, within 15 minutes on two cores, or ``"paper"``, as large as the paper's.
+    """
+    if scale not in SCALES:
+        raise UnknownNameError("scale", scale, SCALES)
+    return Experiment("soma", **SCALES[scale])
 
 
 @dataclass(frozen=True)
