@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial.transform import Rotation, Slerp
 
 from neurosym.errors import InputError, UnknownNameError
 from neurosym.geometry.assembly import Assembly
+from neurosym.geometry.motions import Motion as Between
+from neurosym.ways import Way
 
 if TYPE_CHECKING:
     from neurosym.language.domain import Problem
@@ -34,9 +35,13 @@ class Motion:
         action: name of the action.
         parts: names of the parts that move, as one.
         path: float64 (k, 4, 4), k >= 2: rigid motions of the world, the first the identity. A part that rests at X_WP
-            is at ``path[i] @ X_WP`` on its way out.
+            is at ``path[i] @ X_WP`` on its way out. Between two of them `centre` goes straight and the turn is even.
         arrives: whether the parts come in along the path, from its end, instead of leaving.
         given: whether the plan said how; otherwise a way was looked for here.
+        centre: float64 (3,): a point of the resting parts, in the world.
+        aside: groups of parts that move otherwise meanwhile, each with its own path of k motions and its own centre.
+            Those not in `parts` make way, and are back in place afterwards.
+        held: names of parts that are held meanwhile.
     """
 
     action: str
@@ -44,16 +49,28 @@ class Motion:
     path: Array
     arrives: bool = False
     given: bool = True
+    centre: Array = field(default_factory=lambda: np.zeros(3))
+    aside: tuple[tuple[tuple[str, ...], Array, Array], ...] = ()
+    held: tuple[str, ...] = ()
 
     @property
     def length(self) -> float:
-        """Length of the path of the parts' frame, in the assembly's unit; turning counts nothing."""
-        return float(np.linalg.norm(np.diff(self.path[:, :3, 3], axis=0), axis=1).sum())
+        """How far the parts' centre travels, in the assembly's unit; turning counts nothing."""
+        return float(_legs(self.path, self.centre).sum())
 
     def at(self, share: float) -> Array:
         """float64 (4, 4): the motion of the world when `share` of the step is done, 0 to 1, at even pace."""
         share = min(max(share, 0.0), 1.0)
-        return pose_along(self.path, 1 - share if self.arrives else share)
+        return pose_along(self.path, 1 - share if self.arrives else share, self.centre)
+
+    def where(self, share: float) -> dict[str, Array]:
+        """The same for every part that moves, those that make way among them: name -> float64 (4, 4)."""
+        moved = dict.fromkeys(self.parts, self.at(share))
+        share = min(max(1 - share if self.arrives else share, 0.0), 1.0)
+        key = _key(self.path, share, self.centre)
+        for names, path, centre in self.aside:
+            moved |= dict.fromkeys(names, _at_key(path, key, centre))
+        return moved
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +91,8 @@ class Staging:
 
     def __post_init__(self) -> None:
         known = set(self.assembly.names)
-        for name in (*self.present, *self.colours, *(n for m in self.motions for n in m.parts)):
+        moving = (n for m in self.motions for names in (m.parts, *(group[0] for group in m.aside)) for n in names)
+        for name in (*self.present, *self.colours, *moving):
             if name not in known:
                 raise UnknownNameError("part", name, known)
 
@@ -89,11 +107,14 @@ class Staging:
 def stage(problem: Problem, plan: Sequence[str], how: Sequence[Any] = ()) -> Staging:
     """The motions of a plan.
 
+    The problem says itself what its actions do to parts (`Problem.stage`), or a step's `Way` does, or the problem's
+    `Simulation`; failing these, an action that bears the name of a part takes that part away.
+
     Args:
         problem: what was planned.
         plan: names of actions, in order.
-        how: one entry a step, or none at all, as `PlanResult.how` has them: a direction (3,), a path of poses
-            (k, 4, 4), or None, for which a free straight way is looked for.
+        how: one entry a step, or none at all, as `PlanResult.how` has them: a `Way`, a direction (3,), a path of
+            poses (k, 4, 4), or None, for which a free straight way is looked for.
 
     Raises:
         InputError: the problem does not say what its actions do to parts, or `how` does not fit the plan.
@@ -106,45 +127,76 @@ def stage(problem: Problem, plan: Sequence[str], how: Sequence[Any] = ()) -> Sta
             raise UnknownNameError("action", name, problem.actions)
     if problem.stage is not None:
         return problem.stage(plan, how)
-    removes = None if problem.simulation is None else problem.simulation.removes
-    if removes is None or not isinstance(problem.world, Assembly):
+    world = problem.world
+    simulation = problem.simulation
+    named = {name: name for name in problem.actions if isinstance(world, Assembly) and name in world.index}
+    removes = named if simulation is None else simulation.removes
+    parts = [_parts_of(how[i] if how else None, name, removes) for i, name in enumerate(plan)]
+    if not isinstance(world, Assembly) or not all(parts):
         raise InputError(
             f"Expected a problem that says what its actions do to parts in space; {problem.name!r} does not. Give "
             "Domain.problem a world that is an Assembly and simulation=Simulation('rigid', removes={action: part}), or "
             "a function as stage=."
         )
-    absent = problem.simulation.absent if problem.simulation else ()
-    present = tuple(n for n in problem.world.names if n not in absent)
-    motions = removals(problem.world, present, plan, [(removes[name],) for name in plan], how)
-    return Staging(problem.world, present, motions)
+    # A plan that puts together begins with what it does not bring.
+    arriving = {n for i, names in enumerate(parts) if _arrives(how[i] if how else None) for n in names}
+    absent = arriving.union(() if simulation is None else simulation.absent)
+    present = tuple(n for n in world.names if n not in absent)
+    return Staging(world, present, steps_in_space(world, present, plan, parts, how))
 
 
-def removals(
+def steps_in_space(
     assembly: Assembly,
     present: Sequence[str],
     plan: Sequence[str],
     parts: Sequence[Sequence[str]],
     how: Sequence[Any] = (),
 ) -> tuple[Motion, ...]:
-    """Motions of a plan that takes parts away.
+    """Motions of a plan that takes parts away, or brings them.
 
     Args:
         present: names of the parts that are there at first.
         plan: names of the actions.
-        parts: for each step, the parts that leave together.
-        how: for each step a direction (3,), a path (k, 4, 4), or None; or nothing at all.
+        parts: for each step, the parts that go together.
+        how: for each step a `Way`, a direction (3,), a path (k, 4, 4), or None; or nothing at all.
     """
     there, motions = set(present), []
     for i, (action, names) in enumerate(zip(plan, parts, strict=True)):
-        others = there - set(names)
         given = how[i] if how else None
-        if given is None:
-            given = free_direction(assembly, names, others)
-            motions.append(Motion(action, tuple(names), straight(assembly, names, given, others), given=False))
-        else:
-            motions.append(Motion(action, tuple(names), path_of(assembly, names, given, others)))
-        there = others
+        others = there - set(names)
+        motions.append(_motion(assembly, action, tuple(names), given, others))
+        there = others | set(names) if motions[-1].arrives else others
     return tuple(motions)
+
+
+def _motion(assembly: Assembly, action: str, names: tuple[str, ...], how: Any, others: Collection[str]) -> Motion:
+    centre, arrives = _middle(assembly, names), _arrives(how)
+    if how is None:
+        direction = free_direction(assembly, names, others)
+        return Motion(action, names, straight(assembly, names, direction, others), given=False, centre=centre)
+    if not isinstance(how, Way):
+        return Motion(action, names, path_of(assembly, names, how, others), centre=centre)
+    if how.path is None:
+        if how.direction is None:
+            direction = free_direction(assembly, names, others)
+        else:
+            direction = np.negative(how.direction) if arrives else np.asarray(how.direction)
+        path = straight(assembly, names, direction, others)
+        return Motion(action, names, path, arrives, how.direction is not None, centre, held=how.held)
+    # Backwards it ends where it is assembled; here every path begins there.
+    first, *rest = (how.path.reversed() if arrives else how.path).tracks
+    aside = tuple((track.parts, track.poses, track.centre) for track in rest)
+    return Motion(action, names, first.poses, arrives, True, first.centre, aside, how.held)
+
+
+def _parts_of(how: Any, action: str, removes: Mapping[str, str]) -> tuple[str, ...]:
+    if isinstance(how, Way) and how.parts:
+        return how.parts
+    return (removes[action],) if action in removes else ()
+
+
+def _arrives(how: Any) -> bool:
+    return isinstance(how, Way) and how.arrives
 
 
 def building(
@@ -204,21 +256,38 @@ def free_direction(assembly: Assembly, parts: Sequence[str], others: Collection[
     return np.asarray(graph.vectors[best])
 
 
-def pose_along(path: Array, share: float) -> Array:
+def pose_along(path: Array, share: float, centre: ArrayLike = (0.0, 0.0, 0.0)) -> Array:
     """float64 (4, 4): the motion at a share of a path, 0 to 1, at even pace along the way.
 
-    Positions are interpolated straight, turns along the shortest arc.
+    Between two motions the point that rests at `centre` goes straight, and the turn takes the shortest arc.
     """
-    steps = np.linalg.norm(np.diff(path[:, :3, 3], axis=0), axis=1)
-    if not steps.any():
-        steps = np.ones(len(path) - 1)  # it only turns
-    # A turn on the spot in a path that also travels still takes some time.
-    marks = np.concatenate([[0.0], np.cumsum(np.maximum(steps, 0.02 * steps.sum()))])
-    at = share * marks[-1]
-    X = np.eye(4)
-    X[:3, 3] = [np.interp(at, marks, path[:, i, 3]) for i in range(3)]
-    X[:3, :3] = Slerp(marks, Rotation.from_matrix(path[:, :3, :3]))(at).as_matrix()
-    return X
+    where = np.asarray(centre, dtype=np.float64)
+    return _at_key(path, _key(path, share, where), where)
+
+
+def _legs(path: Array, centre: Array) -> Array:
+    """float64 (k - 1,): how far the centre goes from each motion to the next."""
+    return np.asarray(np.linalg.norm(np.diff(path[:, :3, :3] @ centre + path[:, :3, 3], axis=0), axis=1))
+
+
+def _key(path: Array, share: float, centre: Array) -> float:
+    """The number of the motion, whole or between two, at a share of the way."""
+    legs = _legs(path, centre)
+    # A turn on the spot takes some time too.
+    marks = np.concatenate([[0.0], np.cumsum(np.maximum(legs, max(0.02 * float(legs.sum()), 1e-12)))])
+    return float(np.interp(share * marks[-1], marks, np.arange(len(marks))))
+
+
+def _at_key(path: Array, key: float, centre: Array) -> Array:
+    first = min(int(key), len(path) - 2)
+    return Between(path[first], path[first + 1], centre).at(key - first)
+
+
+def _middle(assembly: Assembly, parts: Collection[str]) -> Array:
+    wanted = {assembly.index[name] for name in parts}
+    own = [i for i, owner in enumerate(assembly.owners) if int(owner) in wanted]
+    bounds = assembly.body_bounds[own]
+    return np.asarray((bounds[:, 0].min(axis=0) + bounds[:, 1].max(axis=0)) / 2)
 
 
 def _extent(assembly: Assembly, parts: Collection[str], unit: Array) -> tuple[float, float]:

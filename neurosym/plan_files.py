@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from neurosym.errors import InputError
 from neurosym.registry import load_domain
+from neurosym.ways import Way
 
 if TYPE_CHECKING:
     from neurosym.language.domain import Problem
@@ -25,7 +26,7 @@ class SavedPlan:
     Attributes:
         problem: made again from what the file says of it.
         plan: names of the actions, in order.
-        how: one entry a step: how it is done (a direction, a path, None), as plain lists.
+        how: one entry a step: how it is done, a `Way`, a direction, a path, or None.
         document: the whole file.
     """
 
@@ -59,7 +60,16 @@ def read_plan(path: str | Path) -> SavedPlan:
                 f"Expected steps in {path} that are actions of {problem.name!r}; got {step['action']!r}, and there are "
                 f"{', '.join(problem.actions)}."
             )
-    return SavedPlan(problem, tuple(s["action"] for s in steps), tuple(s.get("how") for s in steps), document)
+    return SavedPlan(problem, tuple(s["action"] for s in steps), tuple(map(_how, steps)), document)
+
+
+def _how(step: Mapping[str, Any]) -> Any:
+    if "parts" in step:
+        return Way.from_json(step)
+    given = step.get("how")
+    # A direction, as the oracle gave it; a path of poses stays a list.
+    flat = isinstance(given, list) and len(given) == 3 and all(isinstance(v, int | float) for v in given)
+    return tuple(given) if flat else given
 
 
 def problem_of(document: Mapping[str, Any], path: str | Path = "plan.json") -> Problem:
