@@ -9,15 +9,17 @@ STAMP := $(VENV)/.neurosym-installed
 SRC := neurosym domains planners learned_priors tests examples $(wildcard benchmarks)
 OUT ?= out/compare-soma
 
-.PHONY: help setup demo readme test check bench clean constraints
+.PHONY: help setup demo readme reproduce results test check bench clean constraints
 
 help:
-	@echo "make demo    compare planners and priors on the 120 test cubes (table, results.csv, iterations.png)"
-	@echo "make test    the whole test suite"
-	@echo "make check   ruff, mypy --strict, import-linter"
-	@echo "make bench   the benchmarks"
-	@echo "make setup   only make the virtual environment (VENV=$(VENV) PYTHON=$(PYTHON))"
-	@echo "make clean   remove what the above made, the virtual environment excepted"
+	@echo "make demo       compare planners and priors on the 120 test cubes (table, results.csv, iterations.png)"
+	@echo "make reproduce  every experiment of the paper, quick scale (up to 15 minutes each), then make results"
+	@echo "make results    docs/results.md and its figures, from the last runs of make reproduce"
+	@echo "make test       the whole test suite"
+	@echo "make check      ruff, mypy --strict, import-linter"
+	@echo "make bench      the benchmarks"
+	@echo "make setup      only make the virtual environment (VENV=$(VENV) PYTHON=$(PYTHON))"
+	@echo "make clean      remove what the above made, the virtual environment excepted"
 
 setup: $(STAMP)
 
@@ -38,6 +40,15 @@ demo: $(STAMP)
 # The README's table, from the last `make demo`: between the two marks everything is replaced.
 readme: demo
 	sed -i -e '/<!-- table:begin/,/<!-- table:end/{//!d}' -e '/<!-- table:begin/r $(OUT)/results.md' README.md
+
+# A run that was killed goes on where it was.
+EXPERIMENTS := tower tower-by-sequence unseen variable soma scrabble
+reproduce: $(STAMP)
+	@for name in $(EXPERIMENTS); do $(BIN)/neurosym reproduce $$name > /dev/null || exit 1; done
+	@$(MAKE) results
+
+results: $(STAMP)
+	$(BIN)/neurosym results $(addprefix out/reproduce-,$(EXPERIMENTS)) --to docs/results.md
 
 # Two processes, one thread each: numerical libraries that start threads of their own on a shared machine crawl.
 test: $(STAMP)

@@ -16,6 +16,7 @@ from neurosym.commands.compare import compare
 from neurosym.commands.learn import demos, train
 from neurosym.commands.plan import plan
 from neurosym.commands.reproduce import reproduce
+from neurosym.commands.results import results
 from neurosym.commands.survey import doctor, names
 from neurosym.errors import NeurosymError
 from neurosym.exit_codes import BAD_INPUT, EXIT_CODES, INTERRUPTED
@@ -35,6 +36,7 @@ app.command("plan")(plan)
 app.command("demos")(demos)
 app.command("train")(train)
 app.command("reproduce")(reproduce)
+app.command("results")(results)
 app.command("list")(names)
 app.command("doctor")(doctor)
 
