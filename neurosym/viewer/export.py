@@ -1,0 +1,87 @@
+"""One file that plays a plan without a server and without the network."""
+
+from __future__ import annotations
+
+from html import escape
+from pathlib import Path
+
+import numpy as np
+
+from neurosym.errors import InputError
+from neurosym.files import write_text
+from neurosym.viewer import panels
+from neurosym.viewer.scene import PlanScene
+from neurosym.viewer.server import LocalServer
+from neurosym.viewer.session import Shown
+
+#: Scene updates a second of the recording, and seconds that a step takes.
+RATE, SECONDS_PER_STEP = 15, 1.5
+
+#: Seconds that the film rests at its beginning and its end, which it goes round and round.
+PAUSE = 1.0
+
+#: Width of the panel beside the view (CSS pixels).
+PANEL = 400
+
+
+def export_page(shown: Shown, path: str | Path) -> Path:
+    """Write a self-contained page, whole or not at all; its folder is made. Returns the path.
+
+    Raises:
+        InputError: a problem that has no parts in space, or a file name that does not end in .html.
+    """
+    path = Path(path)
+    check_name(path)
+    if shown.timeline is None:
+        raise InputError(f"Expected a problem whose plan can be shown in space. {' '.join(shown.notes)}")
+    write_text(path, _with_panel(_film(shown), shown))
+    return path
+
+
+def check_name(path: Path) -> None:
+    """Refuse a file name that no browser would open as a page; to be asked before the work, not after it."""
+    if path.suffix.lower() not in (".html", ".htm"):
+        raise InputError(f"Expected a file name that ends in .html; got {path.name!r}.")
+
+
+def _film(shown: Shown) -> str:
+    """viser's own player with the recording in it."""
+    timeline = shown.timeline
+    assert timeline is not None
+    server = LocalServer()
+    try:
+        scene = PlanScene(server)
+        scene.put(timeline)
+        recording = server.get_scene_serializer()
+        recording.insert_sleep(PAUSE)
+        frames = round(timeline.n_steps * SECONDS_PER_STEP * RATE)
+        for t in np.linspace(0.0, timeline.n_steps, frames + 1)[1:]:
+            scene.show(float(t))
+            recording.insert_sleep(1.0 / RATE)
+        recording.insert_sleep(PAUSE)
+        return recording.as_html()
+    finally:
+        server.stop()
+
+
+def _with_panel(film: str, shown: Shown) -> str:
+    """The player with what the panel of the page says beside it."""
+    search = shown.search
+    said = (
+        f"{panels.overview(shown)}{panels.steps(shown, None)}"
+        f"<h3>Prior</h3>{panels.scores_table(search.scores, shown.problem.actions, search.steps)}"
+        f"<h3>Reference</h3>{panels.pictures(shown.pictures)}"
+        f"<h3>Attempts, in order</h3>{panels.refusals(search)}"
+    )
+    style = (
+        f"<style>body{{margin:0}}#root{{position:fixed!important;inset:0 {PANEL}px 0 0!important;width:auto!important}}"
+        f"#said{{position:fixed;top:0;right:0;bottom:0;width:{PANEL}px;box-sizing:border-box;overflow:auto;"
+        "padding:10px 4px;border-left:1px solid #ddd;background:#fff;color:#111;font-family:sans-serif}"
+        "#said h3{font-size:14px;margin:14px 0 4px}</style>"
+    )
+    title = f"<title>{escape(shown.problem.name)}</title>"
+    aside = f"{style}<aside id='said'>{panels.styled(said)}</aside>"
+    head, body = "<title>Viser</title>", "</body>"
+    page = film.replace(head, title, 1) if head in film else film
+    before, found, after = page.rpartition(body)
+    return f"{before}{aside}{found}{after}" if found else page + aside

@@ -1,0 +1,81 @@
+"""What geometry knows of one part: what it touches, what blocks it in each direction, what it stands on and carries."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+
+from neurosym.geometry.assembly import Assembly
+
+
+@dataclass(frozen=True)
+class Way:
+    """One direction in which a part might leave.
+
+    Attributes:
+        direction: in words, ``+z``.
+        blockers: names of the parts in the way, of those that are there.
+        into_table: whether the way leads into the table.
+    """
+
+    direction: str
+    blockers: tuple[str, ...]
+    into_table: bool
+
+    @property
+    def free(self) -> bool:
+        return not (self.blockers or self.into_table)
+
+
+@dataclass(frozen=True)
+class PartFacts:
+    """Facts about one part among the parts that are there.
+
+    Attributes:
+        name: of the part.
+        present: whether it is in place itself.
+        touches: parts in contact with it.
+        on_table: whether it touches the table.
+        stands_on: parts that touch it from below.
+        carries: parts that it touches from below.
+        ways: one a direction in which the assembly is built.
+        fixed: whether it never moves.
+    """
+
+    name: str
+    present: bool
+    touches: tuple[str, ...]
+    on_table: bool
+    stands_on: tuple[str, ...]
+    carries: tuple[str, ...]
+    ways: tuple[Way, ...]
+    fixed: bool = False
+
+
+def part_facts(assembly: Assembly, name: str, there: Collection[str]) -> PartFacts:
+    """The facts about a part while only the parts named in `there` are in place.
+
+    The first call for an assembly computes contacts and blocking between all pairs; later ones are bit arithmetic.
+
+    Raises:
+        UnknownNameError: no such part.
+    """
+    assembly[name]  # says which names there are
+    number = assembly.index[name]
+    among = assembly.mask(there) & ~(1 << number)
+    stability, graph = assembly.stability(), assembly.blocking()
+    carried = sum(1 << i for i in range(len(assembly)) if stability.supports[i] >> number & 1)
+    ways = tuple(
+        Way(graph.describe(d), assembly.in_mask(graph.blockers(number, d, among)), bool(graph.into_table[d]))
+        for d in range(len(graph.vectors))
+    )
+    return PartFacts(
+        name=name,
+        present=name in there,
+        touches=assembly.in_mask(stability.touching[number] & among),
+        on_table=bool(stability.on_table >> number & 1),
+        stands_on=assembly.in_mask(stability.supports[number] & among),
+        carries=assembly.in_mask(carried & among),
+        ways=ways,
+        fixed=name in assembly.fixed,
+    )

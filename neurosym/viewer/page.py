@@ -1,0 +1,332 @@
+"""The page: the 3D view, and beside it the plan, the prior, the search, facts about a part, and planning again."""
+
+from __future__ import annotations
+
+import json
+import threading
+import time
+from collections.abc import Mapping
+from typing import Any
+
+import viser
+
+from neurosym.errors import InputError, UnknownNameError
+from neurosym.pipeline import ORACLES
+from neurosym.registry import domain_names, planner_names, prior_names
+from neurosym.viewer import panels
+from neurosym.viewer.facts import part_facts
+from neurosym.viewer.scene import MOST_NAMES, PlanScene
+from neurosym.viewer.server import LocalServer
+from neurosym.viewer.session import REFUSED, Maker, Planning, Query, Shown, problem_maker
+
+#: Scene updates a second while the film plays, and seconds that a step takes at speed 1.
+RATE, SECONDS_PER_STEP = 30.0, 1.5
+
+SPEEDS = ("0.5×", "1×", "2×", "4×", "8×")
+NO_PART, NO_PRIOR = "(no part)", "none"
+
+#: Width of the panel beside the view (CSS pixels).
+PANEL = 420
+
+
+class Page:
+    """The page of one server; all who look at it see, and steer, the same.
+
+    Args:
+        server: where it is shown.
+        query: what the form for planning again says at first.
+        given: problems that bear no number in a family: name -> what makes them, of options.
+    """
+
+    def __init__(
+        self, server: LocalServer, query: Query, given: Mapping[str, Maker] | None = None
+    ) -> None:
+        self.server = server
+        self.query = query
+        self.given = dict(given or {})
+        self.shown: Shown | None = None
+        self.planning: Planning | None = None
+        self.playing = False
+        self._lock = threading.RLock()
+        self._step_shown: tuple[int | None, int] | None = None
+        self._facts_for: tuple[str, tuple[str, ...]] | None = None
+        self._closed = threading.Event()
+        self.scene = PlanScene(server, self._picked)
+        self._build()
+        self._clock = threading.Thread(target=self._run, name="neurosym view", daemon=True)
+        self._clock.start()
+
+    # -- what others call -------------------------------------------------------------------------------------
+
+    def show(self, shown: Shown) -> None:
+        """Put a problem with its search on the page, at the beginning of its film."""
+        with self._lock:
+            self.shown, self.playing = shown, False
+            self.scene.put(shown.timeline)
+            timeline = shown.timeline
+            self.slider.max = max(timeline.n_steps if timeline else 0, 1)
+            self.slider.disabled = self.play.disabled = timeline is None or timeline.n_steps == 0
+            _assign(self.slider, 0.0)
+            self.part.options = (NO_PART, *(timeline.names if timeline else ()))
+            _assign(self.part, NO_PART)
+            _assign(self.names, 0 < len(self.scene.parts) <= MOST_NAMES)
+            self._fill(shown)
+            self._moved(0.0)
+
+    def plan(self, query: Query) -> None:
+        """Plan in the background; what comes out of it is shown.
+
+        Raises:
+            InputError: there is no such domain, planner or prior, or a search is under way.
+        """
+        with self._lock:
+            if self.planning is not None and self.planning.running:
+                raise InputError("Expected one search at a time; stop the one that is under way first.")
+            _check_names(query)
+            self.query = query
+            self.planning = Planning(problem_maker(query, self.given), query)
+            self._say("")
+
+    def close(self) -> None:
+        """End the page's thread and any search; the server is left to who made it."""
+        self._closed.set()
+        if self.planning is not None:
+            self.planning.stop()
+        self._clock.join(5.0)
+
+    # -- the panel --------------------------------------------------------------------------------------------
+
+    def _build(self) -> None:
+        gui = self.server.gui
+        gui.configure_theme(show_logo=False, show_share_button=False, brand_color=(0, 114, 178))
+        gui.main_panel.dock_right()
+        gui.main_panel.set_width(PANEL)
+        self.caption = gui.add_html("")
+        self.slider = gui.add_slider("Step", min=0.0, max=1.0, step=0.01, initial_value=0.0)
+        self.play = gui.add_button("Play", icon=viser.Icon.PLAYER_PLAY)
+        self.speed = gui.add_dropdown("Speed", SPEEDS, initial_value="1×")
+        self.names = gui.add_checkbox("Names of parts", False)
+        tabs = gui.add_tab_group()
+        with tabs.add_tab("Plan"):
+            self.plan_tab = gui.add_html("")
+        with tabs.add_tab("Prior"):
+            self.prior_tab = gui.add_html("")
+        with tabs.add_tab("Search"):
+            self.search_tab = gui.add_html("")
+        with tabs.add_tab("Part"):
+            self.part = gui.add_dropdown("Part", (NO_PART,))
+            self.part_tab = gui.add_html("")
+        with tabs.add_tab("Plan again"):
+            self._build_form()
+        self.slider.on_update(lambda _: self._moved(self.slider.value))
+        self.play.on_click(lambda _: self._toggle())
+        self.names.on_update(lambda _: self.scene.name_parts(self.names.value))
+        self.part.on_update(lambda _: self._picked(self.part.value))
+
+    def _build_form(self) -> None:
+        gui, query = self.server.gui, self.query
+        domains = tuple(dict.fromkeys([*self.given, *domain_names()]))
+        priors = tuple(dict.fromkeys([NO_PRIOR, *prior_names(), query.prior or NO_PRIOR]))
+        self.domain = gui.add_dropdown("Domain", domains, initial_value=query.domain)
+        self.number = gui.add_text("Problem", "" if query.number is None else str(query.number), hint="its number")
+        self.options = gui.add_text(
+            "Options", _written(query.options), hint='of the domain: collapse=rigid; removed=["V"]'
+        )
+        self.planner = gui.add_dropdown("Planner", tuple(planner_names()), initial_value=query.planner)
+        self.prior = gui.add_dropdown("Prior", priors, initial_value=query.prior or NO_PRIOR)
+        self.oracle = gui.add_dropdown("Oracle", ORACLES, initial_value=query.oracle)
+        self.seed = gui.add_text("Seed", str(query.seed))
+        self.seconds = gui.add_text(
+            "Seconds", "" if query.seconds is None else f"{query.seconds:g}", hint="budget; empty sets no limit"
+        )
+        self.again = gui.add_button("Plan again", icon=viser.Icon.REFRESH)
+        self.stop = gui.add_button("Stop", icon=viser.Icon.PLAYER_STOP, color="red", disabled=True)
+        self.bar = gui.add_progress_bar(0.0, animated=True, visible=False)
+        self.message = gui.add_html("")
+        self.again.on_click(lambda _: self._again())
+        self.stop.on_click(lambda _: self._stop())
+
+    def _fill(self, shown: Shown) -> None:
+        search = shown.search
+        self.prior_tab.content = panels.styled(
+            panels.scores_table(search.scores, shown.problem.actions, search.steps)
+            + "<p><b>Reference</b></p>"
+            + panels.pictures(shown.pictures)
+        )
+        self.search_tab.content = panels.styled(panels.refusals(search))
+        self._step_shown = self._facts_for = None
+
+    # -- the film ---------------------------------------------------------------------------------------------
+
+    def _moved(self, t: float) -> None:
+        """Show time t, and what the panel says of it."""
+        with self._lock:
+            shown = self.shown
+            if shown is None:
+                return
+            self.scene.show(t)
+            timeline = shown.timeline
+            now = timeline.step_at(t) if timeline else None
+            key = (now, int(t))
+            if key != self._step_shown:
+                self._step_shown = key
+                self.plan_tab.content = panels.styled(panels.overview(shown) + panels.steps(shown, now))
+                self.caption.content = panels.styled(panels.caption(shown, t))
+                self._tell_facts()
+
+    def _toggle(self) -> None:
+        with self._lock:
+            timeline = self.shown.timeline if self.shown else None
+            if timeline is None:
+                return
+            if not self.playing and self.slider.value >= timeline.n_steps:
+                _assign(self.slider, 0.0)
+            self._play(not self.playing)
+
+    def _play(self, playing: bool) -> None:
+        self.playing = playing
+        self.play.label = "Pause" if playing else "Play"
+        self.play.icon = viser.Icon.PLAYER_PAUSE if playing else viser.Icon.PLAYER_PLAY
+
+    def _picked(self, name: str) -> None:
+        """A part was clicked or chosen; a click on the one that is chosen lets go of it."""
+        with self._lock:
+            chosen = None if name == NO_PART else name
+            if self.part.value != name:
+                _assign(self.part, name)  # which calls this again
+                return
+            self.scene.pick(chosen)
+            self._facts_for = None
+            self._tell_facts()
+
+    def _tell_facts(self) -> None:
+        timeline = self.shown.timeline if self.shown else None
+        name = self.part.value
+        if timeline is None or name not in timeline.names:
+            self.part_tab.content = panels.styled("<p>Click a part, or choose one.</p>")
+            self._facts_for = None
+            return
+        there = timeline.state_at(self.slider.value)
+        if (name, there) == self._facts_for:
+            return
+        self._facts_for = (name, there)
+        try:
+            self.part_tab.content = panels.styled(panels.facts(part_facts(timeline.staging.assembly, name, there)))
+        except REFUSED as error:
+            self.part_tab.content = panels.styled(panels.message(str(error)))
+
+    # -- planning again ---------------------------------------------------------------------------------------
+
+    def _again(self) -> None:
+        try:
+            self.plan(self._asked())
+        except REFUSED as error:
+            self._say(str(error))
+
+    def _stop(self) -> None:
+        if self.planning is not None:
+            self.planning.stop()
+
+    def _asked(self) -> Query:
+        """What the form says.
+
+        Raises:
+            InputError: a field that is not what it should be.
+        """
+        given = self.domain.value in self.given
+        return Query(
+            domain=self.domain.value,
+            number=None if given else _whole("Problem", self.number.value),
+            options=_read_options(self.options.value),
+            planner=self.planner.value,
+            prior=None if self.prior.value == NO_PRIOR else self.prior.value,
+            oracle=self.oracle.value,
+            seed=_whole("Seed", self.seed.value),
+            seconds=_seconds(self.seconds.value),
+        )
+
+    def _say(self, text: str) -> None:
+        self.message.content = panels.styled(panels.message(text)) if text else ""
+
+    def _watch(self) -> None:
+        """What a search that is under way, or has just ended, shows."""
+        with self._lock:
+            planning = self.planning
+            if planning is None:
+                return
+            if planning.running:
+                self.again.disabled, self.stop.disabled, self.bar.visible = True, False, True
+                progress = planning.progress
+                _assign(self.bar, 100.0 * progress.depth / max(progress.steps, 1))
+                self.message.content = panels.styled(panels.progress(progress, stopping=planning.stopped))
+                return
+            self.planning = None
+            self.again.disabled, self.stop.disabled, self.bar.visible = False, True, False
+            if planning.shown is None:
+                self._say(planning.message or "")
+                return
+            self.show(planning.shown)
+            self.message.content = panels.styled(panels.overview(planning.shown))
+
+    def _run(self) -> None:
+        last, watched = time.perf_counter(), 0.0
+        while not self._closed.wait(1.0 / RATE):
+            now = time.perf_counter()
+            passed, last = now - last, now
+            with self._lock:
+                timeline = self.shown.timeline if self.shown else None
+                if self.playing and timeline is not None:
+                    pace = float(self.speed.value.removesuffix("×")) / SECONDS_PER_STEP
+                    t = min(self.slider.value + passed * pace, float(timeline.n_steps))
+                    _assign(self.slider, t)
+                    if t >= timeline.n_steps:
+                        self._play(False)
+            if now - watched > 0.1:
+                watched = now
+                self._watch()
+
+
+def _assign(handle: Any, value: object) -> None:
+    """Set a control. (viser's setter stands apart from its getter, and type checkers take it for read-only.)"""
+    handle.value = value
+
+
+def _check_names(query: Query) -> None:
+    """Refused at once, not in the thread: a planner or a prior that nobody offers."""
+    for kind, name, known in (("planner", query.planner, planner_names()), ("oracle", query.oracle, ORACLES)):
+        if name not in known:
+            raise UnknownNameError(kind, name, known)
+
+
+def _whole(label: str, text: str) -> int:
+    try:
+        return int(text)
+    except ValueError:
+        raise InputError(f"Expected {label} to be a whole number; got {text!r}.") from None
+
+
+def _seconds(text: str) -> float | None:
+    if not text.strip():
+        return None
+    try:
+        return float(text)
+    except ValueError:
+        raise InputError(f"Expected Seconds to be a number, or empty for no limit; got {text!r}.") from None
+
+
+def _written(options: Mapping[str, Any]) -> str:
+    return "; ".join(f"{k}={v if isinstance(v, str) else json.dumps(v)}" for k, v in options.items())
+
+
+def _read_options(text: str) -> dict[str, Any]:
+    """``key=value; key=value``: a value that is JSON is read as such, anything else is text."""
+    found: dict[str, Any] = {}
+    for piece in filter(None, (p.strip() for p in text.split(";"))):
+        key, equals, value = (p.strip() for p in piece.partition("="))
+        if not equals or not key.isidentifier():
+            raise InputError(f"Expected Options as key=value; key=value; got {piece!r}.")
+        try:
+            found[key] = json.loads(value)
+        except ValueError:
+            found[key] = value
+    return found

@@ -1,0 +1,313 @@
+"""What stands beside the 3D view, as HTML: plan, prior, search, pictures, facts about a part. Every name is escaped."""
+
+from __future__ import annotations
+
+import base64
+import io
+from collections.abc import Sequence
+from html import escape
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from neurosym.geometry.directions import in_words
+from neurosym.prior import OrderScores
+from neurosym.viewer.facts import PartFacts
+
+if TYPE_CHECKING:
+    from neurosym.motions import Motion
+    from neurosym.planner import Refusal
+    from neurosym.viewer.session import Progress, Search, Shown
+
+#: Refusals written out; a hard search has thousands.
+MOST_REFUSALS = 300
+
+#: A table of scores with more columns leaves out those that are neither likely at any step nor taken.
+MOST_COLUMNS = 24
+
+#: A table with more rows is drawn as a picture, without numbers and names.
+MOST_ROWS = 40
+
+#: Width of a table of scores (CSS pixels), as wide as the panel beside the view.
+WIDTH = 360
+
+#: Okabe and Ito's blue for probability, and vermilion for what was taken.
+_INK, _TAKEN = np.array([0, 90, 140]), "#D55E00"
+
+
+def overview(shown: Shown) -> str:
+    """How the search ended, its figures, and notes on what is missing."""
+    search = shown.search
+    figures = ", ".join(f"{_figure(value)} {name}" for name, value in search.counts.items())
+    notes = "".join(f"<p class='note'>{escape(note)}</p>" for note in shown.notes)
+    mark = "✔" if search.solved else "✘"
+    return (
+        f"<p><b>{escape(shown.problem.name)}</b><br>{escape(search.settings)}</p>"
+        f"<p>{mark} {escape(search.sentence)}<br><span class='quiet'>{escape(figures)}</span></p>{notes}"
+    )
+
+
+def caption(shown: Shown, t: float) -> str:
+    """Where the film is at time t, in a line."""
+    timeline, total = shown.timeline, len(shown.search.steps)
+    now = timeline.step_at(t) if timeline else None
+    if timeline is None or not total:
+        text = escape(shown.problem.name)
+    elif now is not None:
+        motion = timeline.staging.motions[now]
+        verb = "comes" if motion.arrives else "leaves"
+        text = f"Step {now + 1} of {total}: <b>{escape(shown.search.steps[now])}</b> {verb} {escape(in_short(motion))}"
+    elif t <= 0:
+        text = f"<b>{escape(shown.problem.name)}</b>: before the first of {total} steps"
+    else:
+        text = f"After step {int(t)} of {total}"
+    return f"<div style='min-height:2.7em;padding-top:4px'>{text}</div>"
+
+
+def progress(now: Progress, *, stopping: bool) -> str:
+    """How far a search is."""
+    head = "Stopping after the attempt that is under way …" if stopping else f"{now.phase.capitalize()} …"
+    depth = f", longest prefix {now.depth} of {now.steps}" if now.steps else ""
+    figures = f"{now.attempts:,} attempts, {now.refusals:,} refused, {now.expansions:,} expansions{depth}"
+    return f"<p><b>{escape(head)}</b><br><span class='quiet'>{figures}, {now.seconds:.1f} s</span></p>"
+
+
+def steps(shown: Shown, now: int | None) -> str:
+    """The steps, numbered from 1; the one under way, number `now` from 0, stands out."""
+    motions = shown.timeline.staging.motions if shown.timeline else ()
+    rows = []
+    for i, action in enumerate(shown.search.steps):
+        how = f" <span class='quiet'>{escape(in_short(motions[i]))}</span>" if motions else ""
+        rows.append(f"<li{_MARKED if i == now else ''}>{escape(action)}{how}</li>")
+    what = "" if shown.search.solved else "<p class='note'>No plan: the longest prefix that works is shown.</p>"
+    return f"{what}<ol>{''.join(rows)}</ol>" if rows else f"{what}<p>There is no step to show.</p>"
+
+
+_MARKED = " style='background:#ffe9c9;font-weight:bold'"
+
+
+def in_short(motion: Motion) -> str:
+    """How the parts of a step move, in a few words."""
+    if len(motion.path) > 2:
+        way = f"along a path of {len(motion.path)} poses"
+    else:
+        shift = motion.path[-1, :3, 3] - motion.path[0, :3, 3]
+        shift = -shift if motion.arrives else shift
+        way = f"along {in_words((shift / max(float(np.linalg.norm(shift)), 1e-300)).tolist())}"
+    others = [n for n in motion.parts if n != motion.action]
+    said = f"{way}, with {_some(others)}" if others and motion.action in motion.parts else way
+    if any(set(names) - set(motion.parts) for names, *_ in motion.aside):
+        making_way = [n for names, *_ in motion.aside for n in names if n not in motion.parts]
+        said = f"{said}, {_some(making_way)} making way"
+    if motion.held:
+        said = f"{said}, while {_some(motion.held)} {'is' if len(motion.held) == 1 else 'are'} held"
+    return said if motion.given else f"{said} (the plan does not say how: a way looked for here)"
+
+
+def _some(names: Sequence[str]) -> str:
+    """Names with commas; the many by their first and their number."""
+    return ", ".join(names[:12]) + (f" and {len(names) - 12} more" if len(names) > 12 else "")
+
+
+def refusals(search: Search) -> str:
+    """Attempts in the order in which they were made: refused ones with their reasons, and the steps of the plan."""
+    rows: list[str] = []
+    on_path, done = search.steps, 0
+    for number, refusal in enumerate(search.refusals[:MOST_REFUSALS], 1):
+        depth = len(refusal.after)
+        if on_path[:depth] == refusal.after:
+            rows.extend(_kept(i, on_path[i]) for i in range(done, depth))
+            done = max(done, depth)
+        rows.append(_refused(number, refusal))
+    left = len(search.refusals) - MOST_REFUSALS
+    if left > 0:
+        rows.append(f"<p class='note'>… and {left:,} more refusals.</p>")
+    rows.extend(_kept(i, on_path[i]) for i in range(done, len(on_path)))
+    return "".join(rows) or "<p>Nothing was attempted.</p>"
+
+
+def _kept(step: int, action: str) -> str:
+    return f"<p style='margin:2px 0;color:#00724f'><b>✔ {step + 1}. {escape(action)}</b></p>"
+
+
+def _refused(number: int, refusal: Refusal) -> str:
+    after = escape(", ".join(refusal.after)) or "nothing"
+    return (
+        f"<p style='margin:2px 0 2px 14px'><span style='color:#b04a00'>✘ {number}. not <b>{escape(refusal.action)}</b>"
+        f"</span> <span class='quiet'>after {after}</span><br>{escape(refusal.reason)}</p>"
+    )
+
+
+def scores_table(scores: OrderScores | None, actions: Sequence[str], taken: Sequence[str]) -> str:
+    """A prior's order scores, steps by actions: the darker, the likelier; what was taken at each step has a ring.
+
+    Args:
+        scores: of a prior, float64 (n_steps, n_actions) as `log_prob`.
+        actions: names of the columns.
+        taken: names of the actions that the plan took, step by step.
+    """
+    if scores is None:
+        return "<p>Planned without a prior.</p>"
+    P = np.exp(scores.log_prob)
+    column = {name: j for j, name in enumerate(actions)}
+    marks = [(i, column[name]) for i, name in enumerate(taken) if name in column and i < len(P)]
+    left_out = ""
+    if len(P) > MOST_ROWS:
+        drawn = _as_picture(P, marks)
+    else:
+        kept = _columns_to_show(P, [j for _, j in marks])
+        if len(kept) < len(actions):
+            rest = float(P[:, np.setdiff1d(np.arange(len(actions)), kept)].max())
+            left_out = f" {len(actions) - len(kept)} actions of at most {rest:.2g} at any step are left out."
+        place = {int(j): k for k, j in enumerate(kept)}
+        drawn = _as_cells(P[:, kept], [actions[j] for j in kept], [(i, place[j]) for i, j in marks])
+    said = "The darker, the likelier the prior holds an action (column) at a step (row); a ring marks what was taken."
+    return f"{drawn}<p class='quiet'>{said}{left_out}</p>"
+
+
+def _columns_to_show(P: NDArray[np.float64], taken: Sequence[int]) -> NDArray[np.int64]:
+    if P.shape[1] <= MOST_COLUMNS:
+        return np.arange(P.shape[1])
+    likely = np.argsort(-P.max(axis=0), kind="stable")[: max(MOST_COLUMNS - len(set(taken)), 0)]
+    return np.unique(np.concatenate([likely, np.array(taken, dtype=np.int64)]))
+
+
+def _as_cells(P: NDArray[np.float64], names: Sequence[str], marks: Sequence[tuple[int, int]]) -> str:
+    """An SVG with a square a cell, its probability as a tooltip and, where there is room, as a number."""
+    rows, columns = P.shape
+    side = float(np.clip((WIDTH - 30) / max(columns, 1), 10, 44))
+    longest = max((len(n) for n in names), default=0)
+    upright = longest * 7 <= side
+    head = 18 if upright else 6 * longest + 8
+    font = min(11.0, 0.7 * side)
+    svg = []
+    for j, name in enumerate(names):
+        x = 24 + (j + 0.5) * side
+        turn = "" if upright else f" transform='rotate(-90 {x:.1f} {head - 5})'"
+        anchor = "middle" if upright else "start"
+        y = head - 5 if upright else head - 5 + 0.35 * font
+        svg.append(f"<text x='{x:.1f}' y='{y:.1f}' text-anchor='{anchor}'{turn}>{escape(name)}</text>")
+    for i in range(rows):
+        svg.append(f"<text x='18' y='{head + (i + 0.65) * side:.1f}' text-anchor='end'>{i + 1}</text>")
+        for j in range(columns):
+            p = float(P[i, j])
+            x, y = 24 + j * side, head + i * side
+            tip = f"step {i + 1}, {escape(names[j])}: {p:.3g}"
+            svg.append(
+                f"<rect x='{x:.1f}' y='{y:.1f}' width='{side - 1:.1f}' height='{side - 1:.1f}' fill='{_shade(p)}'>"
+                f"<title>{tip}</title></rect>"
+            )
+            if side >= 26 and p >= 0.005:
+                ink = "#fff" if p > 0.45 else "#222"
+                svg.append(
+                    f"<text x='{x + side / 2:.1f}' y='{y + 0.62 * side:.1f}' text-anchor='middle' fill='{ink}' "
+                    f"pointer-events='none'>{f'{p:.2f}'.removeprefix('0') if p < 0.995 else '1'}</text>"
+                )
+    for i, j in marks:
+        svg.append(
+            f"<rect x='{24 + j * side + 1:.1f}' y='{head + i * side + 1:.1f}' width='{side - 3:.1f}' "
+            f"height='{side - 3:.1f}' fill='none' stroke='{_TAKEN}' stroke-width='2.5' rx='3'/>"
+        )
+    width, height = 26 + columns * side, head + rows * side + 2
+    return (
+        f"<svg width='{width:.0f}' height='{height:.0f}' viewBox='0 0 {width:.0f} {height:.0f}' "
+        f"style='font:{font:.1f}px sans-serif;max-width:100%'>{''.join(svg)}</svg>"
+    )
+
+
+def _as_picture(P: NDArray[np.float64], marks: Sequence[tuple[int, int]]) -> str:
+    """A large table as a picture, a pixel a cell, what was taken in colour."""
+    colours = np.rint(255 + (_INK - 255) * np.sqrt(P)[..., None]).astype(np.uint8)
+    for i, j in marks:
+        colours[i, j] = (213, 94, 0)
+    height = max(40, round(WIDTH * P.shape[0] / P.shape[1]))
+    return (
+        f"<img src='{as_data(colours)}' width='{WIDTH}' height='{height}' alt='order scores' "
+        "style='image-rendering:pixelated;border:1px solid #ccc;max-width:100%'>"
+    )
+
+
+def _shade(p: float) -> str:
+    r, g, b = np.rint(255 + (_INK - 255) * np.sqrt(min(max(p, 0.0), 1.0))).astype(int)
+    return f"#{r:02x}{g:02x}{b:02x}"
+
+
+def pictures(views: NDArray[np.uint8] | None) -> str:
+    """The observation, one picture a view."""
+    if views is None or not len(views):
+        return "<p>There are no reference pictures.</p>"
+    width = int(WIDTH / min(len(views), 2)) - 8
+    images = "".join(
+        f"<img src='{as_data(view)}' width='{width}' alt='view {i}' "
+        "style='image-rendering:pixelated;border-radius:4px;margin:2px;max-width:48%'>"
+        for i, view in enumerate(views, 1)
+    )
+    if len(views) == 1:
+        images = images.replace("max-width:48%", "max-width:100%")
+    return f"<div>{images}</div>"
+
+
+def facts(found: PartFacts) -> str:
+    """What geometry knows of a part."""
+    table = "the table" if found.on_table else ""
+    rows = [
+        ("touches", _names(found.touches, table)),
+        ("stands on", _names(found.stands_on, table)),
+        ("carries", _names(found.carries)),
+    ]
+    ways = []
+    for way in found.ways:
+        blocked = "the table" if way.into_table else ""
+        said = "<b style='color:#00724f'>free</b>" if way.free else _names(way.blockers, blocked)
+        ways.append((escape(way.direction), said))
+    state = "fixed" if found.fixed else "in place" if found.present else "not in place"
+    return (
+        f"<p><b>{escape(found.name)}</b> <span class='quiet'>{state}</span></p>{_table(rows)}"
+        f"<p style='margin-bottom:0'>in the way, by direction</p>{_table(ways)}"
+    )
+
+
+def _names(names: Sequence[str], also: str = "") -> str:
+    found = escape(", ".join(filter(None, [_some(names), also])))
+    return found or "<span class='quiet'>nothing</span>"
+
+
+def _table(rows: Sequence[tuple[str, str]]) -> str:
+    cells = "".join(
+        f"<tr><td class='quiet' style='padding-right:10px;vertical-align:top;white-space:nowrap'>{a}</td>"
+        f"<td>{b}</td></tr>"
+        for a, b in rows
+    )
+    return f"<table>{cells}</table>"
+
+
+def message(text: str) -> str:
+    """Something the user should read: input that was refused, a fault."""
+    return (
+        "<div role='alert' style='border-left:4px solid #D55E00;background:#fff1e6;color:#222;padding:6px 8px'>"
+        f"{escape(text)}</div>"
+    )
+
+
+def styled(content: str) -> str:
+    """A panel's content with the few styles that it uses."""
+    return f"<div class='ns' style='font-size:13px;line-height:1.35;padding:0 10px'>{_STYLE}{content}</div>"
+
+
+_STYLE = (
+    "<style>.ns .quiet{color:#767676}.ns .note{color:#8a4b00}.ns ol{margin:4px 0;padding-left:26px}"
+    ".ns li{padding:1px 4px;border-radius:3px}.ns p{margin:4px 0}.ns td{padding:1px 0}</style>"
+)
+
+
+def as_data(picture: NDArray[np.uint8]) -> str:
+    """A picture, uint8 (H, W, 3), as a data URI."""
+    file = io.BytesIO()
+    Image.fromarray(picture).save(file, format="PNG", optimize=True)
+    return f"data:image/png;base64,{base64.b64encode(file.getvalue()).decode()}"
+
+
+def _figure(value: float) -> str:
+    return f"{value:,}" if isinstance(value, int) else f"{value:.3g}"

@@ -1,0 +1,178 @@
+"""The 3D view: a timeline's parts as nodes of a viser scene, moved by time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import viser
+from numpy.typing import NDArray
+
+from neurosym.simulation.scene import palette_colour
+from neurosym.viewer.solids import solids
+from neurosym.viewer.timeline import Timeline, floor_of
+
+Array = NDArray[np.float64]
+
+#: The largest extent of the work in the scene: cameras, lines and light need no thought of millimetres or metres.
+SIZE = 2.0
+
+#: More parts than this bear no names at first: they would hide the work.
+MOST_NAMES = 12
+
+#: How opaque parts are while another one is selected.
+FAINT = 0.22
+
+#: The camera's field of view (radians, top to bottom), and its distance as a share of the diagonal of all that is seen.
+FIELD_OF_VIEW, DISTANCE = 0.7, 1.3
+
+_EDGE, _PICKED = (45, 45, 45), (213, 94, 0)
+
+
+class PlanScene:
+    """Parts in a viser scene. Nodes are named by the parts' numbers, since names may hold anything.
+
+    Args:
+        server: where the scene is.
+        on_pick: called with a part's name when it is clicked.
+    """
+
+    def __init__(self, server: viser.ViserServer, on_pick: Callable[[str], None] | None = None) -> None:
+        self.server = server
+        self.timeline: Timeline | None = None
+        self.parts: list[viser.MeshHandle] = []
+        self._on_pick = on_pick
+        self._names: list[viser.LabelHandle] = []
+        self._outlines: list[viser.LineSegmentsHandle] = []
+        self._way: viser.LineSegmentsHandle | None = None
+        self._way_of: int | None = None
+        self._picked: str | None = None
+        server.scene.set_up_direction("+z")
+        server.scene.configure_default_lights(enabled=True, cast_shadow=True)
+
+    def put(self, timeline: Timeline | None) -> None:
+        """Show another timeline from its beginning, or nothing."""
+        with self.server.atomic():
+            self.server.scene.remove_by_name("/work")
+            self.timeline, self._picked, self._way, self._way_of = timeline, None, None, None
+            self.parts, self._names, self._outlines = [], [], []
+            if timeline is not None:
+                self._add(timeline)
+                self.show(0.0)
+
+    def _add(self, timeline: Timeline) -> None:
+        assembly, scene = timeline.staging.assembly, self.server.scene
+        low, high = assembly.bounds
+        self.scale = SIZE / float((high - low).max())
+        self.origin = np.array([*(low[:2] + high[:2]) / 2, floor_of(assembly)])
+        thick = 0.004 * SIZE
+        for i, solid in enumerate(solids(assembly)):
+            name = assembly.names[i]
+            colour = timeline.staging.colours.get(name, palette_colour(i))
+            middle = timeline.centres[i]
+            node = scene.add_mesh_simple(
+                f"/work/{i}",
+                (solid.vertices - middle) * self.scale,
+                solid.faces,
+                color=colour,
+                flat_shading=True,
+            )
+            outline = (solid.outline - middle) * self.scale
+            if len(outline):
+                edges = scene.add_line_segments(
+                    f"/work/{i}/edges", outline, _EDGE, thickness=thick * min(1.0, 6.0 / len(assembly) ** 0.5)
+                )
+                self._outlines.append(edges)
+            tag = scene.add_label(
+                f"/work/{i}/name",
+                name,
+                font_screen_scale=0.9,
+                anchor="center-center",
+                visible=len(assembly) <= MOST_NAMES,
+            )
+            self.parts.append(node)
+            self._names.append(tag)
+            if self._on_pick is not None:
+                node.on_click(self._picker(name))
+        self._ground(timeline)
+        self._look(timeline)
+
+    def _picker(self, name: str) -> Callable[[Any], None]:
+        def picked(_: Any) -> None:
+            if self._on_pick is not None:
+                self._on_pick(name)
+
+        return picked
+
+    def _ground(self, timeline: Timeline) -> None:
+        low, high = self._to_scene(timeline.bounds())
+        middle, size = (low + high) / 2, (high - low)[:2] + 0.4 * SIZE
+        self.server.scene.add_grid(
+            "/work/ground",
+            width=float(size[0]),
+            height=float(size[1]),
+            cell_size=0.1 * SIZE,
+            section_size=0.5 * SIZE,
+            cell_color=(222, 222, 218),
+            section_color=(200, 200, 196),
+            position=(float(middle[0]), float(middle[1]), -0.002 * SIZE),
+            plane_color=(240, 240, 237),
+            plane_opacity=1.0 if timeline.staging.assembly.has_table else 0.0,
+        )
+
+    def _look(self, timeline: Timeline) -> None:
+        """Cameras look at all of it from the front, a little from the right and from above."""
+        low, high = self._to_scene(timeline.bounds())
+        middle, reach = (low + high) / 2, float(np.linalg.norm(high - low))
+        eye = middle + DISTANCE * reach * np.array([0.35, -0.75, 0.56])
+        camera = self.server.initial_camera
+        camera.position, camera.look_at, camera.up = tuple(eye), tuple(middle), (0.0, 0.0, 1.0)
+        camera.fov = FIELD_OF_VIEW
+        for client in self.server.get_clients().values():
+            client.camera.position, client.camera.look_at = eye, middle
+
+    def _to_scene(self, points: Array) -> Array:
+        return np.asarray((points - self.origin) * self.scale)
+
+    def show(self, t: float) -> None:
+        """Move all parts to where they are at time t; only what changed is sent."""
+        timeline = self.timeline
+        if timeline is None:
+            return
+        positions, turns = timeline.frames(t)
+        places, seen = self._to_scene(positions), timeline.visible(t)
+        with self.server.atomic():
+            for node, place, turn, visible in zip(self.parts, places, turns, seen):
+                node.position, node.wxyz, node.visible = place, turn, bool(visible)
+            self._show_way(timeline, t)
+
+    def _show_way(self, timeline: Timeline, t: float) -> None:
+        """The way of the step under way as a line; the parts' middle follows it."""
+        step = timeline.step_at(t)
+        if step == self._way_of:
+            return
+        self._way_of = step
+        if self._way is not None:
+            self._way.remove()
+            self._way = None
+        if step is not None:
+            way = self._to_scene(timeline.path_of(step))
+            pieces = np.stack([way[:-1], way[1:]], axis=1)
+            self._way = self.server.scene.add_line_segments("/work/way", pieces, _PICKED, thickness=0.008 * SIZE)
+
+    def pick(self, name: str | None) -> None:
+        """Let one part stand out, or none."""
+        timeline = self.timeline
+        if timeline is None or name == self._picked:
+            return
+        self._picked = name
+        with self.server.atomic():
+            for own, node in zip(timeline.names, self.parts):
+                node.opacity = None if name is None or own == name else FAINT
+
+    def name_parts(self, visible: bool) -> None:
+        """Show or hide the parts' names."""
+        with self.server.atomic():
+            for tag in self._names:
+                tag.visible = visible

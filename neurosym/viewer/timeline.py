@@ -1,0 +1,240 @@
+"""A plan as a film: where every part is at any time t, from 0 (before the first step) to the number of steps.
+
+Step i fills the time from i to i + 1. What leaves goes along the step's path and is then set down before the work, in
+rows in the order of the plan; a group that leaves together is set down as one, and what is taken off it later leaves
+it there. A plan that puts together is the film of its reverse, run backwards.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from neurosym.errors import InputError
+from neurosym.geometry.assembly import Assembly
+from neurosym.geometry.motions import shifted
+from neurosym.motions import Motion, Staging, pose_along
+
+Array = NDArray[np.float64]
+
+#: Share of a step's time that the path of the plan takes; the rest is the carrying to or from the place before it.
+ON_PATH = 0.65
+
+#: Space between what is set down (a share of the parts' median width), and between it and the work (a share of the
+#: work's largest extent).
+GAP, CLEAR = 0.35, 0.35
+
+#: Where a part is between two steps: nowhere, in the work, or set down before it.
+ABSENT, IN_PLACE, APART = 0, 1, 2
+
+
+class Timeline:
+    """The film of a staged plan.
+
+    Attributes:
+        staging: what happens.
+        names: names of the parts, in the order of every array here.
+        n_steps: the last time.
+        where: uint8 (n_steps + 1, n_parts): `ABSENT`, `IN_PLACE` or `APART` at each whole time.
+        shifts: float64 (n_steps + 1, n_parts, 3): how far each part is from its rest in the work at each whole time.
+        backwards: whether the film is that of taking apart, run backwards.
+    """
+
+    def __init__(self, staging: Staging) -> None:
+        self.staging = staging
+        self.names = staging.assembly.names
+        self.n_steps = len(staging.motions)
+        self.backwards = bool(staging.motions) and all(m.arrives for m in staging.motions)
+        present, motions = staging.present, staging.motions
+        if self.backwards:
+            present = (*present, *(n for m in motions for n in m.parts))
+            motions = tuple(replace(m, arrives=False) for m in reversed(motions))
+        self._motions = motions
+        self._movers = [self._numbers(m.parts) for m in motions]
+        places = _rows_before(staging.assembly, self._movers, self.backwards)
+        where, shifts = self._between_steps(set(present), places)
+        self.where, self.shifts = (where[::-1], shifts[::-1]) if self.backwards else (where, shifts)
+
+    def _numbers(self, names: Sequence[str]) -> NDArray[np.int64]:
+        return np.array([self.staging.assembly.index[n] for n in names], dtype=np.int64)
+
+    def _between_steps(self, present: set[str], places: Array) -> tuple[NDArray[np.uint8], Array]:
+        """`where` and `shifts` of the film as it is played; what is to arrive in it waits before the work."""
+        n = len(self.names)
+        where = np.zeros((self.n_steps + 1, n), dtype=np.uint8)
+        shifts = np.zeros((self.n_steps + 1, n, 3))
+        where[0, self._numbers(sorted(present))] = IN_PLACE
+        for step, (motion, movers) in enumerate(zip(self._motions, self._movers)):
+            waiting = movers[where[0, movers] == ABSENT]
+            if motion.arrives:
+                where[0, waiting], shifts[0, waiting] = APART, places[step]
+        for step, (motion, movers) in enumerate(zip(self._motions, self._movers)):
+            where[step + 1], shifts[step + 1] = where[step], shifts[step]
+            where[step + 1, movers] = IN_PLACE if motion.arrives else APART
+            shifts[step + 1, movers] = 0.0 if motion.arrives else places[step]
+        return where, shifts
+
+    @cached_property
+    def bounds_at_rest(self) -> Array:
+        """float64 (n_parts, 2, 3): bounds of the parts, in the work."""
+        return part_bounds(self.staging.assembly)
+
+    @cached_property
+    def centres(self) -> Array:
+        """float64 (n_parts, 3): the middle of each part's bounds, at rest in the work."""
+        middle: Array = self.bounds_at_rest.mean(axis=1)
+        return middle
+
+    def step_at(self, t: float) -> int | None:
+        """Number of the step that is under way at time t, or None at a whole time."""
+        step = int(np.floor(self._within(t)))
+        return step if t > step and step < self.n_steps else None
+
+    def state_at(self, t: float) -> tuple[str, ...]:
+        """Names of the parts in place when the step under way at time t began."""
+        return self.staging.there(int(np.floor(self._within(t))))
+
+    def motions(self, t: float) -> Array:
+        """float64 (n_parts, 4, 4): how each part has moved at time t from its rest in the work."""
+        t = self._within(t)
+        step = int(np.floor(t))
+        X = np.tile(np.eye(4), (len(self.names), 1, 1))
+        X[:, :3, 3] = self.shifts[step]
+        if t > step:
+            index = self.staging.assembly.index
+            for name, moved in self._under_way(step, t - step).items():
+                X[index[name]] = moved
+        return X
+
+    def frames(self, t: float) -> tuple[Array, Array]:
+        """The parts' centres, float64 (n_parts, 3), and turns, float64 (n_parts, 4), quaternions w, x, y, z."""
+        X = self.motions(t)
+        positions: Array = np.einsum("nij,nj->ni", X[:, :3, :3], self.centres) + X[:, :3, 3]
+        turns = np.tile([1.0, 0.0, 0.0, 0.0], (len(X), 1))
+        turned = (X[:, :3, :3] != np.eye(3)).any(axis=(1, 2))
+        if turned.any():
+            turns[turned] = Rotation.from_matrix(X[turned, :3, :3]).as_quat()[:, [3, 0, 1, 2]]
+        return positions, turns
+
+    def visible(self, t: float) -> NDArray[np.bool_]:
+        """bool (n_parts,): which parts are to be seen at time t."""
+        t = self._within(t)
+        step = int(np.floor(t))
+        seen: NDArray[np.bool_] = self.where[step] != ABSENT
+        return seen if t == step else seen | (self.where[step + 1] != ABSENT)
+
+    def bounds(self) -> Array:
+        """float64 (2, 3): bounds of all that is to be seen at any whole time."""
+        boxes = self.bounds_at_rest[None] + self.shifts[:, :, None]
+        seen = boxes[self.where != ABSENT] if self.where.any() else self.bounds_at_rest
+        return np.stack([seen[:, 0].min(axis=0), seen[:, 1].max(axis=0)])
+
+    def path_of(self, step: int) -> Array:
+        """float64 (k, 3): the way of the middle of what moves in a step, out from where it rests."""
+        number = self._played(step)
+        motion, base = self._motions[number], self._base(number)
+        way: Array = motion.path[:, :3, :3] @ motion.centre + motion.path[:, :3, 3] + base
+        return way
+
+    def _within(self, t: float) -> float:
+        if not np.isfinite(t):
+            raise InputError(f"Expected a time from 0 to {self.n_steps}; got {t!r}.")
+        return float(np.clip(t, 0.0, self.n_steps))
+
+    def _played(self, step: int) -> int:
+        """The number, among the motions as they are played, of a step of the plan."""
+        return self.n_steps - 1 - step if self.backwards else step
+
+    def _at(self, time: int) -> Array:
+        """`shifts` at a whole time of the film as it is played."""
+        shifts: Array = self.shifts[self.n_steps - time if self.backwards else time]
+        return shifts
+
+    def _base(self, number: int) -> Array:
+        """float64 (3,): how far from the work the path of a motion begins: 0, or where its group was set down."""
+        motion, movers = self._motions[number], self._movers[number]
+        base: Array = self._at(number + 1 if motion.arrives else number)[movers[0]]
+        return base
+
+    def _under_way(self, step: int, share: float) -> dict[str, Array]:
+        """Name -> float64 (4, 4): the motions of the parts that move, when `share` of a step's time has passed."""
+        number = self._played(step)
+        motion = self._motions[number]
+        if self.backwards or motion.arrives:
+            share = 1.0 - share
+        motion, base = replace(motion, arrives=False), shifted(self._base(number))
+        if share <= ON_PATH:
+            return {name: base @ X for name, X in motion.where(_eased(share / ON_PATH)).items()}
+        share = _eased((share - ON_PATH) / (1 - ON_PATH))
+        # What made way goes back while the others are carried on.
+        moved = {name: base @ X for name, X in motion.where(1 - share).items()}
+        arrives = self._motions[number].arrives
+        there = self._at(number if arrives else number + 1)[self._movers[number][0]]
+        carried = self._carried(base @ motion.path[-1], there, motion, share)
+        return moved | dict.fromkeys(motion.parts, carried)
+
+    def _carried(self, end: Array, there: Array, motion: Motion, share: float) -> Array:
+        """float64 (4, 4): on the way from the end of the path, over everything, to where it is set down."""
+        last = shifted(there)
+        over_end, over_last = end.copy(), last.copy()
+        height = end[2, :3] @ motion.centre + end[2, 3]
+        over_end[2, 3] += max(self._top - height, 0.0)
+        over_last[2, 3] = max(self._top - motion.centre[2], last[2, 3])
+        return pose_along(np.stack([end, over_end, over_last, last]), share, motion.centre)
+
+    @cached_property
+    def _top(self) -> float:
+        """Height (z) to which the middle of what is carried over the others is raised."""
+        boxes = self.bounds_at_rest
+        return float(boxes[:, 1, 2].max() + 0.6 * np.ptp(boxes[..., 2], axis=1).max())
+
+
+def part_bounds(assembly: Assembly) -> Array:
+    """float64 (n_parts, 2, 3): bounds of the parts at rest, in the world."""
+    low, high = np.full((len(assembly), 3), np.inf), np.full((len(assembly), 3), -np.inf)
+    np.minimum.at(low, assembly.owners, assembly.body_bounds[:, 0])
+    np.maximum.at(high, assembly.owners, assembly.body_bounds[:, 1])
+    return np.stack([low, high], axis=1)
+
+
+def floor_of(assembly: Assembly) -> float:
+    """Height (z) of the table, or of the lowest point where there is no table."""
+    return assembly.ground if assembly.has_table else float(assembly.bounds[0, 2])
+
+
+def _rows_before(assembly: Assembly, groups: Sequence[NDArray[np.int64]], backwards: bool) -> Array:
+    """Shifts, float64 (n_groups, 3), that set groups of parts down in rows before the work, towards -y, left to right.
+
+    Args:
+        groups: numbers of the parts, in the order of the rows, or `backwards` against it.
+    """
+    shifts = np.zeros((len(groups), 3))
+    if not len(groups):
+        return shifts
+    boxes = part_bounds(assembly)
+    low = np.array([boxes[g, 0].min(axis=0) for g in groups])
+    size = np.array([boxes[g, 1].max(axis=0) for g in groups]) - low
+    gap = GAP * float(np.median(size[:, :2]))
+    work = assembly.bounds
+    # About as wide as the work, or as a square of all footprints.
+    area = float(np.prod(size[:, :2] + gap, axis=1).sum())
+    width = max(float(work[1, 0] - work[0, 0]), float(np.sqrt(1.5 * area)))
+    left = float(work[0, 0] + work[1, 0] - width) / 2
+    x, y, deep = left, float(work[0, 1]) - CLEAR * float(np.ptp(work, axis=0).max()), 0.0
+    for i in reversed(range(len(groups))) if backwards else range(len(groups)):
+        if x > left and x + size[i, 0] > left + width:
+            x, y, deep = left, y - deep - gap, 0.0
+        shifts[i] = np.array([x, y - size[i, 1], floor_of(assembly)]) - low[i]
+        x += float(size[i, 0]) + gap
+        deep = max(deep, float(size[i, 1]))
+    return shifts
+
+
+def _eased(share: float) -> float:
+    """Slow at both ends."""
+    return float(share * share * (3 - 2 * share))
