@@ -18,8 +18,9 @@ FARTHEST = 50.0
 def inset_vertices(vertices: Array, faces: NDArray[np.int64], depth: float) -> Array:
     """Vertices, float64 (n, 3), moved so that every face lies `depth` (length) farther in, with the same faces.
 
-    Each vertex goes the shortest way that brings it `depth` behind the planes of all faces about it. Where no way
-    does (two tips that meet in one point), it goes as far behind them as it can, and touch there may count as a hit.
+    Each vertex goes the shortest way that brings it `depth` behind the planes of all faces about it; faces back to
+    back, inside a mesh put together from others, are left out. Where no way does that (two tips that meet in one
+    point), it goes behind their mean, and touch may count as a hit there.
 
     Args:
         vertices: float64 (n, 3) of a closed mesh.
@@ -45,19 +46,29 @@ def inset_vertices(vertices: Array, faces: NDArray[np.int64], depth: float) -> A
 
 
 def _way_in(normals: Array) -> Array:
-    """The shortest d (3,) with n . d <= -1 for all unit normals (k, 3), by non-negative least squares.
-
-    That is Lawson and Hanson's least distance problem ("Solving least squares problems", 1974, chapter 23).
-    """
+    """The shortest d (3,) with n . d <= -1 for all unit normals (k, 3), or the best there is."""
     first: Array = normals[0]
     if np.abs(normals - first).max() < 1e-6:
         return np.negative(first)
     n = np.unique(np.round(normals, 9), axis=0)
+    way = _least_distance(n)
+    if way is None:
+        way = _least_distance(n[(n @ n.T).min(axis=1) > -1 + 1e-9])
+    if way is None:
+        way = -n.mean(axis=0)
+    return np.multiply(way, min(1.0, FARTHEST / max(float(np.linalg.norm(way)), 1e-300)))
+
+
+def _least_distance(n: Array) -> Array | None:
+    """The shortest d (3,) with n . d <= -1 for all rows of n (k, 3), by non-negative least squares; None: none does.
+
+    Lawson and Hanson's least distance problem ("Solving least squares problems", 1974, chapter 23).
+    """
+    if not len(n):
+        return None
     weights, residual = nnls(np.concatenate([-n.T, np.ones((1, len(n)))]), np.array([0.0, 0.0, 0.0, 1.0]))
     rest = np.concatenate([-n.T @ weights, [weights.sum() - 1.0]])
     if residual < 1e-6 or -rest[3] < 1e-9:
-        mean: Array = -n.mean(axis=0)
-        return mean
-    d: Array = -rest[:3] / rest[3]
-    length = float(np.linalg.norm(d))
-    return np.multiply(d, min(1.0, FARTHEST / length))
+        return None
+    way: Array = rest[:3] / -rest[3]
+    return way
