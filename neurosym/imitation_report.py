@@ -10,8 +10,8 @@ import numpy as np
 from neurosym import __version__
 from neurosym.files import write_text
 from neurosym.findings import findings
+from neurosym.records import write_records
 from neurosym.reporting import provenance
-from neurosym.reproduce import write_records
 from neurosym.study_figures import Drawn, write_figures
 from neurosym.study_results import Results
 

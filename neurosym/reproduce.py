@@ -5,14 +5,10 @@ Every finished training and comparison is kept, so a run that was killed goes on
 
 from __future__ import annotations
 
-import csv
-import io
 import json
-import os
-import platform
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from types import MappingProxyType
@@ -21,12 +17,16 @@ from typing import Any
 import numpy as np
 
 from neurosym import __version__, benchmark
-from neurosym.benchmark import Comparison, Outcome, Run
+from neurosym.benchmark import Comparison, Outcome
 from neurosym.engines import connection, cores, run_tasks
 from neurosym.errors import InputError, UnknownNameError
 from neurosym.family import Progress
 from neurosym.files import write_text, written_whole
+from neurosym.planning_report import report, write_results
+from neurosym.records import Record
 from neurosym.registry import load_domain, load_prior
+
+__all__ = ["Cell", "Experiment", "report", "reproduce", "soma_experiment", "train_cell"]
 
 #: Called with one line about what is going on.
 Say = Callable[[str], None]
@@ -90,19 +90,6 @@ class Cell:
         return out / "weights" / f"{self.style}-{self.method}-split{self.split}.safetensors"
 
 
-@dataclass(frozen=True)
-class Record:
-    """One number: a line of results.csv."""
-
-    experiment: str
-    pictures: str
-    method: str
-    n: int
-    seed: int
-    metric: str
-    value: float
-
-
 def reproduce(
     experiment: Experiment,
     out: Path,
@@ -147,7 +134,7 @@ def reproduce(
                 records += _records(experiment, outcome, style, split, out)
                 say(f"{style} pictures, split {split}: compared.")
                 progress(len(cells) + len(outcomes), total)
-    _write(experiment, records, outcomes, out)
+    write_results(experiment, records, outcomes, out)
     return records
 
 
@@ -249,76 +236,8 @@ def _records(experiment: Experiment, outcome: Outcome, style: str, split: int, o
             header = load_prior(Cell(style, method, split).path(out)).header  # type: ignore[attr-defined]
             add(method, "training_seconds", header["training"]["seconds"])
     if outcome.image_blind is not None:
-        add("best fixed order", "initial_failures", outcome.image_blind)
+        add("blind", "initial_failures", outcome.image_blind)
     return found
-
-
-def _write(
-    experiment: Experiment, records: Sequence[Record], outcomes: dict[tuple[str, int], Outcome], out: Path
-) -> None:
-    write_records(records, out / "results.csv")
-    write_text(out / "report.md", report(experiment, records))
-    from neurosym.plotting import iterations_figure, save
-
-    for style in experiment.styles:
-        own = [outcomes[style, split] for split in range(experiment.splits)]
-        runs: tuple[Run, ...] = tuple(r for o in own for r in o.runs)
-        numbers = tuple(n for o in own for n in o.comparison.numbers)
-        pooled = Outcome(replace(own[0].comparison, numbers=numbers), runs)
-        save(iterations_figure(pooled), out / f"iterations-{style}.png")
-
-
-def write_records(records: Sequence[Record], path: Path) -> None:
-    """Write results.csv, a line a number, whole or not at all."""
-    text = io.StringIO()
-    writer = csv.DictWriter(text, list(Record.__dataclass_fields__), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(asdict(r) for r in records)
-    write_text(path, text.getvalue())
-
-
-def report(experiment: Experiment, records: Sequence[Record]) -> str:
-    """A page of Markdown: ours beside the paper's, means over splits with the deviation between splits."""
-    published = {(r["prior"], r["planner"]): r for r in load_domain(experiment.domain).published}
-    lines = [
-        f"# {experiment.domain}: {experiment.splits} random splits",
-        "",
-        "Trained on one half, tested on the other. Mean over splits ± deviation between splits; iterations are "
-        "refusals before the plan. The paper's deviation is over problems and splits.",
-    ]
-    for style in experiment.styles:
-        columns = ["initial failures %", *(f"iterations, {p}" for p in experiment.planners), "training s"]
-        head = ["method", *columns, "paper: failures %", "paper: iterations"]
-        lines += ["", f"## {style} pictures", "", f"| {' | '.join(head)} |", "|" + "---|" * len(head)]
-        for method in ("best fixed order", "random", *experiment.methods):
-            paper = published.get((method, "swap-repair"), {})
-            row = [
-                _mean(records, style, method, "initial_failures", 100, 1),
-                *(_mean(records, style, method, f"iterations {p}", 1, 3) for p in experiment.planners),
-                _mean(records, style, method, "training_seconds", 1, 0),
-                _pair(paper.get("initial_failures")),
-                _pair(paper.get("iterations")),
-            ]
-            lines.append(f"| {method} | " + " | ".join(row) + " |")
-    lines += [
-        "",
-        f"neurosym {__version__}, Python {platform.python_version()}, {os.cpu_count()} processors; seed "
-        f"{experiment.seed}, each test problem planned {experiment.repeats} times. The best fixed order is the one "
-        "that fails least on the training half: it looks at no picture.",
-        "",
-    ]
-    return "\n".join(lines)
-
-
-def _mean(records: Sequence[Record], style: str, method: str, metric: str, scale: float, digits: int) -> str:
-    values = [scale * r.value for r in records if (r.pictures, r.method, r.metric) == (style, method, metric)]
-    if not values:
-        return ""
-    return f"{np.mean(values):.{digits}f}" + (f" ± {np.std(values):.{digits}f}" if len(values) > 1 else "")
-
-
-def _pair(value: tuple[float, float] | None) -> str:
-    return "" if value is None else f"{value[0]} ± {value[1]}"
 
 
 def _same_experiment(experiment: Experiment, out: Path) -> None:

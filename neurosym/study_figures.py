@@ -24,7 +24,7 @@ from neurosym.plotting import (
 from neurosym.study_results import Results
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from neurosym.plotting import Figure
 
 #: Classes above which each method's confusion matrix is a figure of its own.
 LARGE = 10

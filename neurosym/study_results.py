@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import Any
 
 from neurosym.measures import Counts
-from neurosym.reproduce import Record
+from neurosym.records import Record
 from neurosym.studies import Study, Trial
 
 

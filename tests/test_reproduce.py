@@ -45,13 +45,16 @@ def test_a_killed_experiment_goes_on_and_ends_the_same(tmp_path, monkeypatch):
         lines = list(csv.DictReader(file))
     assert list(lines[0]) == ["experiment", "pictures", "method", "n", "seed", "metric", "value"]
     methods = {line["method"] for line in lines}
-    assert methods == {"random", "sinkhorn-paper", "tcn-paper", "best fixed order"}
-    blind = [float(x["value"]) for x in lines if x["method"] == "best fixed order"]
+    assert methods == {"random", "sinkhorn-paper", "tcn-paper", "blind"}
+    blind = [float(x["value"]) for x in lines if x["method"] == "blind"]
     assert 0.3 < blind[0] <= 1
     page = (folder / "report.md").read_text()
     assert "5.35 ± 4.12" in page
     assert "51.55 ± 6.19" in page
-    assert (folder / "iterations-clean.png").stat().st_size > 10_000
+    for name in ("iterations-clean", "methods-clean"):
+        assert (folder / f"{name}.png").stat().st_size > 10_000
+        assert (folder / f"{name}.svg").read_text().startswith("<?xml")
+        assert f"({name}.png)" in page
 
 
 def test_a_folder_belongs_to_one_experiment(tmp_path):

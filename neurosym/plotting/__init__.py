@@ -1,5 +1,7 @@
 """Figures. They are returned, never shown, and touch no global state of matplotlib: the caller saves or shows them."""
 
+from typing import TYPE_CHECKING
+
 from neurosym.plotting.confusion import confusion_figure
 from neurosym.plotting.curves import Curves, Spread, curves_figure
 from neurosym.plotting.density import density_figure
@@ -7,6 +9,9 @@ from neurosym.plotting.errors import classes_figure, repeats_figure
 from neurosym.plotting.iterations import LAST_BAR, iterations_figure
 from neurosym.plotting.points import Panel, points_figure
 from neurosym.plotting.style import COLOURS, COLUMN, look_of, save, save_both
+
+if TYPE_CHECKING:
+    from neurosym.plotting.style import Figure as Figure
 
 __all__ = [
     "COLOURS",

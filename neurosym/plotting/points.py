@@ -73,6 +73,8 @@ def _draw(axis: Axes, rows: Sequence[str], panel: Panel) -> None:
         axis.set_xlim(*panel.limits)
         if panel.limits == (0.0, 1.0):
             axis.set_xticks([0, 0.5, 1], ["0", ".5", "1"])
+        else:
+            axis.locator_params(axis="x", nbins=2)
     tidy(axis, sides=("top", "right", "left"))
     axis.tick_params(axis="y", length=0)
 

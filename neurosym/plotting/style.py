@@ -10,7 +10,7 @@ from neurosym.files import replacing
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure as Figure
 
 #: Okabe and Ito's colours, told apart by people with any of the common colour deficiencies. One a prior, in order.
 COLOURS = ("#7f7f7f", "#E69F00", "#56B4E9", "#D55E00", "#0072B2", "#009E73", "#CC79A7", "#000000")
