@@ -15,9 +15,11 @@ from neurosym import __version__
 from neurosym.commands.compare import compare
 from neurosym.commands.learn import demos, train
 from neurosym.commands.plan import plan
+from neurosym.commands.replay import replay
 from neurosym.commands.reproduce import reproduce
 from neurosym.commands.results import results
 from neurosym.commands.survey import doctor, names
+from neurosym.commands.view import view
 from neurosym.errors import NeurosymError
 from neurosym.exit_codes import BAD_INPUT, EXIT_CODES, INTERRUPTED
 
@@ -33,8 +35,10 @@ app = typer.Typer(
 )
 app.command("compare")(compare)
 app.command("plan")(plan)
+app.command("view")(view)
 app.command("demos")(demos)
 app.command("train")(train)
+app.command("replay")(replay)
 app.command("reproduce")(reproduce)
 app.command("results")(results)
 app.command("list")(names)

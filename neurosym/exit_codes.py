@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from neurosym.planner import Status
 
-#: `doctor` found something amiss; also what typer leaves with when the reader of a pipe has gone.
+#: `doctor` found something amiss, or `replay` something that moved; also what typer leaves with when the reader of a
+#: pipe has gone.
 UNWELL = 1
 #: Bad input: an option, a file or a name; a message on stderr says which, and what was expected.
 BAD_INPUT = 33
@@ -14,7 +15,7 @@ INTERRUPTED = 130
 #: Exit code -> what it means.
 EXIT_CODES: dict[int, str] = {
     **{status.exit_code: status.sentence for status in Status},
-    UNWELL: "`neurosym doctor` found something that does not work; each line says what to do.",
+    UNWELL: "`neurosym doctor` found something that does not work, or `neurosym replay` something that moved.",
     BAD_INPUT: "Bad input: the message says what was expected, what came, and what to do.",
     INTERRUPTED: "Interrupted.",
 }

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from neurosym.assembly_files import referenced
 from neurosym.errors import InputError
 from neurosym.registry import load_domain
 from neurosym.ways import Way
@@ -42,7 +43,7 @@ def read_plan(path: str | Path) -> SavedPlan:
     Raises:
         InputError: no such file, not what `neurosym plan --out` writes, of another schema, or without a plan in it.
     """
-    document = _document(Path(path))
+    document = read_document(Path(path))
     schema = document.get("schema")
     if schema != SCHEMA:
         raise InputError(f"Expected a plan of schema {SCHEMA} in {path}; got {schema!r}. Plan again with this version.")
@@ -68,8 +69,9 @@ def _how(step: Mapping[str, Any]) -> Any:
         return Way.from_json(step)
     given = step.get("how")
     # A direction, as the oracle gave it; a path of poses stays a list.
-    flat = isinstance(given, list) and len(given) == 3 and all(isinstance(v, int | float) for v in given)
-    return tuple(given) if flat else given
+    if isinstance(given, list) and len(given) == 3 and all(isinstance(v, int | float) for v in given):
+        return tuple(given)
+    return given
 
 
 def problem_of(document: Mapping[str, Any], path: str | Path = "plan.json") -> Problem:
@@ -85,16 +87,20 @@ def problem_of(document: Mapping[str, Any], path: str | Path = "plan.json") -> P
     try:
         if document.get("cells") is not None:
             made: Problem = family.problem_from_cells(document["cells"], **options)  # type: ignore[attr-defined]
+        elif document.get("assembly") is not None:
+            made = family.problem(referenced(document["assembly"], Path(path)), name=document.get("problem"), **options)
         elif document.get("number") is not None:
             made = family.problem(document["number"], **options)
         else:
-            raise InputError(f'Expected {path} to say which problem it solves ("number" or "cells"); it says neither.')
+            raise InputError(
+                f'Expected {path} to say which problem it solves ("number", "cells" or "assembly"); it says none.'
+            )
     except (AttributeError, TypeError) as error:
         raise InputError(f"Expected {path} to name a problem of {domain!r}, with options that fit; {error}.") from None
     return made
 
 
-def _document(path: Path) -> dict[str, Any]:
+def read_document(path: Path) -> dict[str, Any]:
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from neurosym.simulation.oracle import PhysicsOracle
     from neurosym.simulation.picture_cache import cached_pictures
     from neurosym.simulation.render import PictureStudio, render_many, render_views
+    from neurosym.simulation.replay import ReplayReport, StepReplay, replay_plan, replay_staging
     from neurosym.simulation.scene import PALETTE
     from neurosym.simulation.world import Physics, World, stands
 
@@ -20,6 +21,7 @@ _HOME = {
     "oracle": ("PhysicsOracle",),
     "picture_cache": ("cached_pictures",),
     "render": ("PictureStudio", "render_many", "render_views"),
+    "replay": ("ReplayReport", "StepReplay", "replay_plan", "replay_staging"),
     "scene": ("PALETTE",),
     "world": ("Physics", "World", "stands"),
 }
@@ -33,12 +35,16 @@ __all__ = [
     "Physics",
     "PhysicsOracle",
     "PictureStudio",
+    "ReplayReport",
+    "StepReplay",
     "Style",
     "World",
     "cached_pictures",
     "open_clients",
     "render_many",
     "render_views",
+    "replay_plan",
+    "replay_staging",
     "stands",
 ]
 

@@ -32,8 +32,19 @@ def collision_shape(client: Client, body: RigidBody, shapes: dict[tuple[float, .
         if size not in shapes:
             shapes[size] = p.createCollisionShape(p.GEOM_BOX, halfExtents=size, physicsClientId=c)
         return shapes[size]
-    kinds, halves, files, positions, turns = [], [], [], [], []
     X_CW = np.linalg.inv(body.X_WC)
+    if len(body.solids) == 1 and first.faces is not None:
+        corners = first.corners @ X_CW[:3, :3].T + X_CW[:3, 3]
+        return int(
+            p.createCollisionShape(
+                p.GEOM_MESH,
+                vertices=corners.tolist(),
+                indices=first.faces.ravel().tolist(),
+                flags=p.GEOM_FORCE_CONCAVE_TRIMESH,
+                physicsClientId=c,
+            )
+        )
+    kinds, halves, files, positions, turns = [], [], [], [], []
     for solid in body.solids:
         X_CB = X_CW @ solid.X_WB
         kinds.append(p.GEOM_MESH if solid.half is None else p.GEOM_BOX)

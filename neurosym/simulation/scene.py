@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from neurosym.errors import InputError, UnknownNameError
 from neurosym.geometry.assembly import Assembly, Box, Shape
+from neurosym.motions import Staging
 
 Array = NDArray[np.float64]
 RGB = tuple[float, float, float]
@@ -177,6 +178,12 @@ def palette_colour(i: int) -> RGB:
     amount = 1 - 0.6 ** ((turn + 1) // 2)
     r, g, b = base + (1 - base) * amount if turn % 2 else base * (1 - amount)
     return float(r), float(g), float(b)
+
+
+def part_colours(staging: Staging) -> dict[str, RGB]:
+    """A colour for each part of a plan: its own, or the palette's by its place in the assembly."""
+    names = staging.assembly.names
+    return {name: staging.colours.get(name, palette_colour(i)) for i, name in enumerate(names)}
 
 
 def _checked(name: str, colour: Sequence[float]) -> RGB:

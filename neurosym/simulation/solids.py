@@ -20,6 +20,13 @@ from neurosym.geometry.assembly import Assembly, Body, Box, Part
 
 Array = NDArray[np.float64]
 BodiesKind = Literal["parts", "cubes"]
+#: What to do with meshes that are not convex: refuse them, or take them apart by V-HACD.
+MeshesKind = Literal["refuse", "decompose"]
+
+#: A mesh that fills its convex hull to this share is taken as the hull: CAD facets are rarely exactly convex.
+CONVEX_FILL = 1 - 1e-3
+#: The same where meshes may be decomposed, as V-HACD's pieces are no nearer to such a mesh than its hull is.
+NEARLY_CONVEX_FILL = 0.95
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,9 +37,11 @@ class Solid:
         X_WB: float64 (4, 4), pose of the piece.
         half: float64 (3,), half edge lengths of a box; None for a convex hull.
         vertices: float64 (n, 3), corners in the piece's own frame.
-        volume: its volume.
+        volume: its volume. Of the pieces of a decomposed mesh, which only collide, the first has all of the mesh's
+            mass properties and the others none: pieces overlap, the mesh's own integrals are exact.
         centre: float64 (3,), centre of mass in the scene.
         inertia: float64 (3, 3), about `centre`, axes of the scene, for density one.
+        faces: int64 (m, 3), where it is to collide as the mesh it is, which only a part that never moves can.
     """
 
     X_WB: Array
@@ -41,6 +50,7 @@ class Solid:
     volume: float
     centre: Array
     inertia: Array
+    faces: NDArray[np.int64] | None = None
 
     @property
     def corners(self) -> Array:
@@ -83,7 +93,13 @@ def typical_extent(assembly: Assembly) -> float:
     return float(np.median([np.cbrt(np.prod(e)) for e in extents]))
 
 
-def rigid_bodies(assembly: Assembly, kind: BodiesKind, scale: float, clearance: float = 0.0) -> tuple[RigidBody, ...]:
+def rigid_bodies(
+    assembly: Assembly,
+    kind: BodiesKind,
+    scale: float,
+    clearance: float = 0.0,
+    meshes: MeshesKind = "refuse",
+) -> tuple[RigidBody, ...]:
     """The bodies that a simulation of `assembly` moves, lengths multiplied by `scale`.
 
     Args:
@@ -91,26 +107,29 @@ def rigid_bodies(assembly: Assembly, kind: BodiesKind, scale: float, clearance: 
         kind: ``"parts"``: each part is one rigid compound; ``"cubes"``: each piece of it is a body of its own.
         scale: scene lengths per length unit of the assembly.
         clearance: share of its width that an upright box gives up at its sides (not at its top and bottom).
+        meshes: what becomes of meshes that are not convex; those of fixed parts are always kept as they are.
 
     Raises:
-        InputError: `kind` is neither, or a part has a mesh that is not convex.
+        InputError: `kind` is neither, or a part has a mesh that is not convex and is not to be decomposed.
     """
     if kind not in ("parts", "cubes"):
         raise InputError(f"Expected bodies='parts' or bodies='cubes'; got {kind!r}.")
     heaviest = max(part.density for part in assembly.parts)
     made = []
     for part in assembly.parts:
-        solids = [_solid(part, body, scale, clearance) for body in part.bodies]
+        static = part.name in assembly.fixed and len(part.bodies) == 1  # a mesh joins no compound
+        solids = [s for body in part.bodies for s in _solids(part, body, scale, clearance, meshes, static)]
         groups: Sequence[Sequence[Solid]] = [solids] if kind == "parts" else [[solid] for solid in solids]
         made += [_join(part.name, i, group, part.density / heaviest) for i, group in enumerate(groups)]
     return tuple(made)
 
 
-def _solid(part: Part, body: Body, scale: float, clearance: float) -> Solid:
+def _solids(
+    part: Part, body: Body, scale: float, clearance: float, meshes: MeshesKind, static: bool
+) -> list[Solid]:
     X_WB = np.array(part.X_WP @ body.X_PB, dtype=np.float64)
     X_WB[:3, 3] *= scale
-    corners = body.shape.vertices * scale
-    half: Array | None = None
+    R, corners = X_WB[:3, :3], body.shape.vertices * scale
     if isinstance(body.shape, Box):
         half = np.round(body.shape.size * scale, 9) / 2
         upright = np.abs(X_WB[2, :3]) > 1 - 1e-6
@@ -118,27 +137,38 @@ def _solid(part: Part, body: Body, scale: float, clearance: float) -> Solid:
             half = np.where(upright, half, half * (1 - clearance))
             corners = np.sign(corners) * half
         # Solid cuboid: I_xx = m (b^2 + c^2) / 12 with full edges, so a third of the squared halves.
+        volume = float(8 * np.prod(half))
         moments = (np.sum(half**2) - half**2) / 3
-        volume, centre, inertia = float(8 * np.prod(half)), np.zeros(3), np.diag(moments) * 8 * np.prod(half)
-    else:
-        volume, centre, inertia = _convex_properties(part.name, corners, body.shape.faces)
-    R = X_WB[:3, :3]
-    return Solid(X_WB, half, corners, volume, R @ centre + X_WB[:3, 3], R @ inertia @ R.T)
+        return [Solid(X_WB, half, corners, volume, X_WB[:3, 3].copy(), R @ np.diag(moments) @ R.T * volume)]
+    return _mesh_solids(part.name, X_WB, corners, body.shape.faces, meshes, static)
 
 
-def _convex_properties(name: str, vertices: Array, faces: NDArray[np.int64]) -> tuple[float, Array, Array]:
-    """Volume, centre and inertia (density one) of a closed convex mesh, in its own frame."""
+def _mesh_solids(
+    name: str, X_WB: Array, corners: Array, faces: NDArray[np.int64], meshes: MeshesKind, static: bool
+) -> list[Solid]:
     import trimesh
 
-    mesh = trimesh.Trimesh(vertices, faces, process=True)
+    mesh = trimesh.Trimesh(corners, faces, process=True)
     hull = mesh.convex_hull
-    # Bullet would silently fill the hollows: a bowl would become a disc. 1e-3: CAD facets are rarely exactly convex.
-    if abs(mesh.volume) < (1 - 1e-3) * hull.volume:
+    fill = abs(mesh.volume) / hull.volume
+    convex = fill >= (CONVEX_FILL if meshes == "refuse" else NEARLY_CONVEX_FILL)
+    # Bullet would silently fill the hollows: a bowl would become a disc.
+    if not convex and not static and meshes == "refuse":
         raise InputError(
             f"Expected part {name!r} as boxes or convex pieces, which is what a simulator can move; got a mesh that "
-            f"fills {abs(mesh.volume) / hull.volume:.0%} of its convex hull. Give the part as several Convex bodies."
+            f"fills {fill:.0%} of its convex hull. Give the part as several Convex bodies."
         )
-    return float(hull.volume), np.asarray(hull.center_mass), np.asarray(hull.moment_inertia)
+    exact = hull if convex else mesh
+    R = X_WB[:3, :3]
+    volume, centre = float(abs(exact.volume)), R @ np.asarray(exact.center_mass) + X_WB[:3, 3]
+    inertia = R @ np.asarray(exact.moment_inertia) @ R.T
+    if convex or static:
+        return [Solid(X_WB, None, corners, volume, centre, inertia, None if convex else faces)]
+    from neurosym.simulation.decomposition import convex_pieces
+
+    first, *rest = convex_pieces(name, corners, faces)
+    massless = (0.0, np.zeros(3), np.zeros((3, 3)))
+    return [Solid(X_WB, None, first, volume, centre, inertia), *(Solid(X_WB, None, v, *massless) for v in rest)]
 
 
 def _join(name: str, index: int, solids: Sequence[Solid], density: float) -> RigidBody:

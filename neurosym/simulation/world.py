@@ -20,7 +20,15 @@ from numpy.typing import NDArray
 from neurosym.errors import InputError, UnknownNameError
 from neurosym.simulation.client import Client
 from neurosym.simulation.collision_shapes import collision_shape
-from neurosym.simulation.solids import BodiesKind, RigidBody, matrix, quaternion, rigid_bodies, typical_extent
+from neurosym.simulation.solids import (
+    BodiesKind,
+    MeshesKind,
+    RigidBody,
+    matrix,
+    quaternion,
+    rigid_bodies,
+    typical_extent,
+)
 
 if TYPE_CHECKING:
     from neurosym.geometry.assembly import Assembly
@@ -76,11 +84,15 @@ class World:
         assembly: the parts, in the world.
         bodies: ``"parts"``: each part moves as one; ``"cubes"``: every body of every part moves alone.
         physics: friction, gravity and the solver's numbers.
-        ground: height of the table; None takes the assembly's own.
+        ground: height of the table; None takes the assembly's own, which may be none at all.
         present: names of the parts that are there; None means all.
+        meshes: whether meshes that are not convex are refused, or taken apart into convex pieces (V-HACD).
+        window: show it in PyBullet's own window.
+
+    The assembly's fixed parts never move, whatever their shape.
 
     Raises:
-        InputError: a part that is not made of convex pieces.
+        InputError: a part that is not made of convex pieces, where those are asked for.
     """
 
     def __init__(
@@ -91,19 +103,22 @@ class World:
         physics: Physics | None = None,
         ground: float | None = None,
         present: Collection[str] | None = None,
+        meshes: MeshesKind = "refuse",
+        window: bool = False,
     ) -> None:
         self.assembly = assembly
         self.physics = physics or Physics()
         self.unit = typical_extent(assembly)
         self._scale = 1 / self.unit
         self._ground = assembly.ground if ground is None else ground
-        made = rigid_bodies(assembly, bodies, self._scale, self.physics.clearance)
+        made = rigid_bodies(assembly, bodies, self._scale, self.physics.clearance, meshes)
         self._made = {(body.part, body.index): body for body in made}
         self._corners = {key: body.corners_C for key, body in self._made.items()}
         self._ids: dict[BodyKey, int] = {}
+        self._shapes: dict[tuple[float, ...], int] = {}
         if present is not None and (unknown := set(present) - {part for part, _ in self._made}):
             raise UnknownNameError("part", min(unknown), (part for part, _ in self._made))
-        self._client = Client()
+        self._client = Client(window=window)
         self._p: Any = self._client.p
         try:
             self.initial = Snapshot(
@@ -145,23 +160,71 @@ class World:
             deterministicOverlappingPairs=1,
             physicsClientId=c,
         )
-        # Bullet multiplies the frictions of two bodies.
-        friction = self.assembly.friction if self.physics.friction is None else self.physics.friction
-        surface = sqrt(friction)
-        plane = p.createCollisionShape(p.GEOM_PLANE, physicsClientId=c)
-        table = p.createMultiBody(0, plane, basePosition=[0, 0, self._ground * self._scale], physicsClientId=c)
-        p.changeDynamics(table, -1, lateralFriction=surface, physicsClientId=c)
-        self._ids = {}
-        shapes: dict[tuple[float, ...], int] = {}
+        if np.isfinite(self._ground):
+            plane = p.createCollisionShape(p.GEOM_PLANE, physicsClientId=c)
+            table = p.createMultiBody(0, plane, basePosition=[0, 0, self._ground * self._scale], physicsClientId=c)
+            p.changeDynamics(table, -1, lateralFriction=self.surface, physicsClientId=c)
+        self._ids, self._shapes = {}, {}
+        self._build(snapshot)
+
+    @property
+    def surface(self) -> float:
+        """Friction of each surface: Bullet multiplies those of the two bodies."""
+        return sqrt(self.assembly.friction if self.physics.friction is None else self.physics.friction)
+
+    def add(self, *parts: str) -> None:
+        """Put whole parts into the scene, where they rest when assembled.
+
+        Raises:
+            UnknownNameError: no such part.
+        """
+        for part in parts:
+            own = {key: _frame(body) for key, body in self._made.items() if key[0] == part}
+            if not own:
+                raise UnknownNameError("part", part, self.assembly.names)
+            self._build(Snapshot(own))
+
+    def numbers(self, part: str) -> dict[BodyKey, int]:
+        """The simulator's numbers of a part's bodies; empty when it is not there."""
+        return {key: number for key, number in self._ids.items() if key[0] == part}
+
+    def paint(self, part: str, colour: tuple[float, float, float]) -> None:
+        """Give a part that is there a colour, RGB in 0..1, for a window."""
+        for number in self.numbers(part).values():
+            self._p.changeVisualShape(number, -1, rgbaColor=[*colour, 1.0], physicsClientId=self._client.id)
+
+    @property
+    def client(self) -> Client:
+        """The connection to the simulator."""
+        return self._client
+
+    @property
+    def scale(self) -> float:
+        """Scene lengths per length unit of the assembly."""
+        return self._scale
+
+    @property
+    def weight(self) -> float:
+        """Of everything that moves and is there, in the scene's units of force; under no gravity as on Earth."""
+        gravity = self.physics.gravity or 9.81
+        return gravity * sum(body.mass for key, body in self._made.items() if key in self._ids)
+
+    def _build(self, snapshot: Snapshot) -> None:
+        p, c = self._p, self._client.id
         with tempfile.TemporaryDirectory(prefix="neurosym-") as folder:
             for key, body in self._made.items():
                 if key not in snapshot.frames:
                     continue
                 position, turn = snapshot.frames[key]
-                shape = collision_shape(self._client, body, shapes, Path(folder))
-                number = p.createMultiBody(body.mass, shape, -1, position, turn, physicsClientId=c)
+                shape = collision_shape(self._client, body, self._shapes, Path(folder))
+                mass = 0.0 if body.part in self.assembly.fixed else body.mass
+                number = p.createMultiBody(mass, shape, -1, position, turn, physicsClientId=c)
                 p.changeDynamics(
-                    number, -1, lateralFriction=surface, localInertiaDiagonal=body.inertia.tolist(), physicsClientId=c
+                    number,
+                    -1,
+                    lateralFriction=self.surface,
+                    localInertiaDiagonal=body.inertia.tolist(),
+                    physicsClientId=c,
                 )
                 self._ids[key] = number
 

@@ -1,0 +1,173 @@
+"""Parts that are taken along a path, or held: by hand, past the others, or by a grip that pulls against them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from math import ceil
+
+import numpy as np
+from numpy.typing import NDArray
+
+from neurosym.motions import Motion
+from neurosym.simulation.solids import matrix, quaternion
+from neurosym.simulation.world import BodyKey, World
+
+Array = NDArray[np.float64]
+#: Position and quaternion (x, y, z, w) of a body's centre-of-mass frame, in the scene's scale.
+Frame = tuple[list[float], list[float]]
+
+#: Overlap on the way that is still touch, as a share of a typical body: settled parts sink into one another by
+#: thousandths, and hulls carry a margin of 1e-3.
+TOUCH_SHARE = 1e-2
+#: How fast a part is pulled: typical bodies a second. Slow enough that friction acts and inertia hardly does.
+PULL_SPEED = 1.0
+#: How hard a grip may pull, in weights of everything there: enough for friction, not for tearing things apart.
+PULL_WEIGHTS = 20.0
+
+
+class Carrier:
+    """Takes the moving parts of one step along their path, from where they lie now.
+
+    Args:
+        world: where they are.
+        motion: the step; of its parts and those that make way, all that are there move.
+    """
+
+    def __init__(self, world: World, motion: Motion) -> None:
+        self.world, self.motion = world, motion
+        self._p, self._c = world.client.p, world.client.id
+        names = dict.fromkeys([*motion.parts, *(name for group in motion.aside for name in group[0])])
+        self._numbers: dict[BodyKey, int] = {}
+        for name in names:
+            self._numbers |= world.numbers(name)
+        self._start = {
+            key: matrix(*self._p.getBasePositionAndOrientation(number, physicsClientId=self._c))
+            for key, number in self._numbers.items()
+        }
+
+    def in_the_way(self) -> tuple[str, ...]:
+        """Names of the parts that the moving ones would cut into anywhere on the way, others where they lie now.
+
+        Looked for at places half the thinnest body apart, so that nothing is jumped over.
+        """
+        reach = max(self.motion.length, self._turning())
+        count = max(1, ceil(reach / (self.world.assembly.smallest_extent / 2)))
+        hit: set[str] = set()
+        for i in range(1, count + 1):
+            self.put(i / count)
+            hit |= self._overlapped()
+        self.put(0.0)
+        return tuple(name for name in self.world.assembly.names if name in hit)
+
+    def put(self, out: float) -> None:
+        """Put the moving parts, at rest, where they are at a share of the way out: 0 in place, 1 outside."""
+        for key, (position, turn) in self._frames(out).items():
+            number = self._numbers[key]
+            self._p.resetBasePositionAndOrientation(number, position, turn, physicsClientId=self._c)
+            self._p.resetBaseVelocity(number, (0, 0, 0), (0, 0, 0), physicsClientId=self._c)
+
+    def collide(self, wanted: bool) -> None:
+        """Whether the moving parts collide with anything from now on."""
+        for number in self._numbers.values():
+            self._p.setCollisionFilterGroupMask(number, -1, int(wanted), -int(wanted), physicsClientId=self._c)
+
+    def pull(self, after_step: Callable[[], None]) -> float:
+        """Pull the moving parts along, out or in as the step goes, by a grip: friction and collisions included.
+
+        Args:
+            after_step: called after each time step.
+
+        Returns:
+            How far they stayed behind the path at the end, at most, in the assembly's length unit: far, if jammed.
+        """
+        p, c, world = self._p, self._c, self.world
+        inward = self.motion.arrives
+        self.put(float(inward))
+        steps = ceil(max(self.motion.length, self._turning()) * world.scale / PULL_SPEED / world.physics.time_step)
+        aims = self._frames(float(inward))
+        with Grip(world, self._numbers) as grip:
+            for i in range(1, steps + 1):
+                aims = self._frames(1 - i / steps if inward else i / steps)
+                grip.to(aims, PULL_WEIGHTS * world.weight)
+                world.step()
+                after_step()
+                if not inward and i % 24 == 0 and self._is_clear():
+                    break
+            ends = {k: p.getBasePositionAndOrientation(n, physicsClientId=c)[0] for k, n in self._numbers.items()}
+        return max(float(np.linalg.norm(np.subtract(ends[k], aims[k][0]))) for k in ends) / world.scale
+
+    def _frames(self, out: float) -> dict[BodyKey, Frame]:
+        where = self.motion.where(1 - out if self.motion.arrives else out)
+        found = {}
+        for key, X in self._start.items():
+            motion = where[key[0]].copy()
+            motion[:3, 3] *= self.world.scale
+            Y = motion @ X
+            found[key] = (Y[:3, 3].tolist(), quaternion(Y[:3, :3]).tolist())
+        return found
+
+    def _turning(self) -> float:
+        """How far a corner of what moves goes by turning alone, about."""
+        R = self.motion.path[:, :3, :3]
+        angles = np.arccos(np.clip((np.einsum("kij,kij->k", R[1:], R[:-1]) - 1) / 2, -1, 1))
+        return float(angles.sum()) * self.world.assembly.smallest_extent * 2
+
+    def _overlapped(self) -> set[str]:
+        p, c, world = self._p, self._c, self.world
+        limit, hit = TOUCH_SHARE * world.unit * world.scale, set()
+        for other in {key[0] for key in world.bodies} - {key[0] for key in self._numbers}:
+            for number in world.numbers(other).values():
+                for own in self._numbers.values():
+                    # Entry 8 is the distance between the two bodies there, negative where they overlap.
+                    near = p.getClosestPoints(own, number, 0.0, physicsClientId=c)
+                    if any(-point[8] > limit for point in near):
+                        hit.add(other)
+        return hit
+
+    def _is_clear(self) -> bool:
+        """Whether the bounds of what moves are away from those of all else."""
+        p, c = self._p, self._c
+        mine = np.array([p.getAABB(n, physicsClientId=c) for n in self._numbers.values()])
+        others = [self.world.numbers(k[0])[k] for k in self.world.bodies if k not in self._numbers]
+        if not others:
+            return True
+        theirs = np.array([p.getAABB(n, physicsClientId=c) for n in others])
+        below = (mine[:, None, 0] < theirs[None, :, 1]).all(axis=2)
+        return not (below & (mine[:, None, 1] > theirs[None, :, 0]).all(axis=2)).any()
+
+
+def hold(world: World, parts: Sequence[str]) -> Grip:
+    """A grip that keeps parts where they lie now, until it is left."""
+    numbers = {key: number for name in parts for key, number in world.numbers(name).items()}
+    grip = Grip(world, numbers)
+    grip.to({key: grip.frames[key] for key in numbers}, PULL_WEIGHTS * world.weight)
+    return grip
+
+
+class Grip:
+    """Holds bodies by constraints: where they are, or where `to` says (a context manager)."""
+
+    def __init__(self, world: World, numbers: Mapping[BodyKey, int]) -> None:
+        self._p, self._c = world.client.p, world.client.id
+        self._constraints: dict[BodyKey, int] = {}
+        self.frames: dict[BodyKey, Frame] = {}
+        for key, number in numbers.items():
+            position, turn = self._p.getBasePositionAndOrientation(number, physicsClientId=self._c)
+            self.frames[key] = (list(position), list(turn))
+            self._constraints[key] = self._p.createConstraint(
+                number, -1, -1, -1, self._p.JOINT_FIXED, (0, 0, 0), (0, 0, 0), position, (0, 0, 0, 1), turn,
+                physicsClientId=self._c,
+            )  # fmt: skip
+
+    def to(self, frames: Mapping[BodyKey, Frame], force: float) -> None:
+        """Draw each body towards a frame, with at most `force`."""
+        for key, constraint in self._constraints.items():
+            position, turn = frames[key]
+            self._p.changeConstraint(constraint, position, turn, maxForce=force, physicsClientId=self._c)
+
+    def __enter__(self) -> Grip:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for constraint in self._constraints.values():
+            self._p.removeConstraint(constraint, physicsClientId=self._c)
