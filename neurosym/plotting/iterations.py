@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from neurosym.benchmark import NO_PRIOR, Outcome, Run
-from neurosym.plotting.style import COLOURS, COLUMN
+from neurosym.plotting.style import COLOURS, COLUMN, LOOKS
 from neurosym.reporting import published
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ def iterations_figure(outcome: Outcome) -> Figure:
     for axis, planner in zip(axes, planners):
         for position, prior in enumerate(priors):
             runs = [r for r in outcome.runs if (r.planner, r.prior) == (planner, prior)]
-            _histogram(axis, len(priors) - 1 - position, runs, COLOURS[position % len(COLOURS)], last)
+            _histogram(axis, len(priors) - 1 - position, runs, _colour(prior, position), last)
             paper = published(comparison.domain, planner, prior)
             if paper and paper.get("iterations"):
                 at = min(float(paper["iterations"][0]), last + 0.45)
@@ -63,6 +63,11 @@ def _histogram(axis: Axes, level: int, runs: Sequence[Run], colour: str, last: i
     mean = float(iterations.mean())
     axis.plot(min(mean, last + 0.45), level + 0.13, "o", ms=4, mfc="black", mec="white", mew=0.7, zorder=5)
     axis.text(last + 0.75, level + 0.1, f"{mean:.2f}", fontsize=7, va="bottom", ha="left", zorder=3)
+
+
+def _colour(prior: str, position: int) -> str:
+    """That of the prior in all figures, or one by position."""
+    return LOOKS[prior].colour if prior in LOOKS else COLOURS[position % len(COLOURS)]
 
 
 def _dress(axis: Axes, planner: str, priors: Sequence[str], last: int) -> None:

@@ -35,10 +35,10 @@ class Panel:
     limits: tuple[float, float] | None = (0.0, 1.0)
 
 
-def points_figure(title: str, rows: Sequence[str], panels: Sequence[Panel]) -> Figure:
-    """Rows from the top down, panels side by side. Open dots are seeds, the large one their mean, diamonds the paper's.
+def points_figure(title: str, rows: Sequence[str], panels: Sequence[Panel], *, each: str = "one seed") -> Figure:
+    """Rows from the top down, panels side by side: open dots are values, full ones their mean, diamonds the paper's.
 
-    Made for a column of `COLUMN` inches.
+    Made for a column of `COLUMN` inches. `each` says what an open dot is.
     """
     from matplotlib.figure import Figure
 
@@ -49,7 +49,7 @@ def points_figure(title: str, rows: Sequence[str], panels: Sequence[Panel]) -> F
     axes[0].set_yticks(range(len(rows)), rows[::-1], fontsize=SMALL)
     axes[0].set_ylim(-0.6, len(rows) - 0.4)
     figure.suptitle(title, fontsize=TITLE)
-    _legend(figure, with_paper=any(set(panel.paper) & set(rows) for panel in panels))
+    _legend(figure, each, with_paper=any(set(panel.paper) & set(rows) for panel in panels))
     return figure
 
 
@@ -79,11 +79,11 @@ def _draw(axis: Axes, rows: Sequence[str], panel: Panel) -> None:
     axis.tick_params(axis="y", length=0)
 
 
-def _legend(figure: Figure, *, with_paper: bool) -> None:
+def _legend(figure: Figure, each: str, *, with_paper: bool) -> None:
     from matplotlib.lines import Line2D
 
     handles = [
-        Line2D([], [], ls="", marker="o", ms=3.2, mfc="none", mec="0.3", label="one seed"),
+        Line2D([], [], ls="", marker="o", ms=3.2, mfc="none", mec="0.3", label=each),
         Line2D([], [], ls="", marker="o", ms=5, mfc="0.3", mec="white", label="mean"),
     ]
     if with_paper:
