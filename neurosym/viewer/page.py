@@ -10,14 +10,15 @@ from typing import Any
 
 import viser
 
-from neurosym.errors import InputError, UnknownNameError
+from neurosym.errors import InputError
+from neurosym.language.domain import Problem
 from neurosym.pipeline import ORACLES
 from neurosym.registry import domain_names, planner_names, prior_names
 from neurosym.viewer import panels
 from neurosym.viewer.facts import part_facts
 from neurosym.viewer.scene import MOST_NAMES, PlanScene
 from neurosym.viewer.server import LocalServer
-from neurosym.viewer.session import REFUSED, Maker, Planning, Query, Shown, problem_maker
+from neurosym.viewer.session import REFUSED, Maker, Planning, Query, Shown, check_query, problem_maker
 
 #: Scene updates a second while the film plays, and seconds that a step takes at speed 1.
 RATE, SECONDS_PER_STEP = 30.0, 1.5
@@ -73,8 +74,12 @@ class Page:
             self._fill(shown)
             self._moved(0.0)
 
-    def plan(self, query: Query) -> None:
+    def plan(self, query: Query, problem: Problem | None = None) -> None:
         """Plan in the background; what comes out of it is shown.
+
+        Args:
+            query: what to plan, and how.
+            problem: its problem, where it is made already.
 
         Raises:
             InputError: there is no such domain, planner or prior, or a search is under way.
@@ -82,9 +87,10 @@ class Page:
         with self._lock:
             if self.planning is not None and self.planning.running:
                 raise InputError("Expected one search at a time; stop the one that is under way first.")
-            _check_names(query)
+            check_query(query)
             self.query = query
-            self.planning = Planning(problem_maker(query, self.given), query)
+            make = problem_maker(query, self.given) if problem is None else lambda: problem
+            self.planning = Planning(make, query)
             self._say("")
 
     def close(self) -> None:
@@ -289,13 +295,6 @@ class Page:
 def _assign(handle: Any, value: object) -> None:
     """Set a control. (viser's setter stands apart from its getter, and type checkers take it for read-only.)"""
     handle.value = value
-
-
-def _check_names(query: Query) -> None:
-    """Refused at once, not in the thread: a planner or a prior that nobody offers."""
-    for kind, name, known in (("planner", query.planner, planner_names()), ("oracle", query.oracle, ORACLES)):
-        if name not in known:
-            raise UnknownNameError(kind, name, known)
 
 
 def _whole(label: str, text: str) -> int:

@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from neurosym.errors import InputError, NeurosymError
+from neurosym.errors import InputError, NeurosymError, UnknownNameError
 from neurosym.language.domain import Problem
 from neurosym.motions import stage
-from neurosym.pipeline import advice, solve
-from neurosym.planner import Budget, PlanResult, Refusal, SearchLog
+from neurosym.pipeline import ORACLES, advice, solve
+from neurosym.planner import Budget, PlanResult, Refusal, SearchLog, Status
 from neurosym.prior import OrderScores
-from neurosym.registry import load_domain
+from neurosym.registry import load_domain, planner_names, prior_names
 from neurosym.viewer.timeline import Timeline
 
 if TYPE_CHECKING:
@@ -66,8 +66,8 @@ class Search:
     Attributes:
         steps: names of the actions that are played: the plan, or the longest prefix that works.
         how: one entry a step, as `PlanResult.how` has them, or nothing.
-        sentence: how it ended.
-        solved: whether `steps` is a plan.
+        status: how it ended.
+        sentence: that in words.
         refusals: refused attempts in order.
         counts: figures by name, for people.
         settings: planner, prior and oracle in a few words.
@@ -76,12 +76,17 @@ class Search:
 
     steps: tuple[str, ...]
     how: tuple[Any, ...]
+    status: Status
     sentence: str
-    solved: bool
     refusals: tuple[Refusal, ...]
     counts: Mapping[str, float]
     settings: str
     scores: OrderScores | None = None
+
+    @property
+    def solved(self) -> bool:
+        """Whether `steps` is a plan."""
+        return self.status is Status.SOLVED
 
     @classmethod
     def of(cls, result: PlanResult, query: Query, scores: OrderScores | None, *, stopped: bool = False) -> Search:
@@ -94,20 +99,27 @@ class Search:
         how = () if result.plan is None else result.how
         settings = _settings(query.planner, query.prior, query.oracle)
         sentence = said or result.status.sentence
-        return cls(steps, how, sentence, result.solved, result.blame, counts, settings, scores)
+        return cls(steps, how, result.status, sentence, result.blame, counts, settings, scores)
 
     @classmethod
     def saved(cls, saved: SavedPlan, scores: OrderScores | None) -> Search:
-        """What a plan's file says of it."""
+        """What a plan's file says of it.
+
+        Raises:
+            InputError: the file's account of the search is not what `neurosym plan --out` writes.
+        """
         document = saved.document
-        refusals = tuple(
-            Refusal(tuple(r["after"]), r["action"], r["reason"], tuple(r["because"]))
-            for r in document.get("refusals", ())
-        )
-        counts = {name: document[name] for name in _COUNTS if name in document}
+        try:
+            status = Status[document["status"]]
+            refusals = tuple(
+                Refusal(tuple(r["after"]), str(r["action"]), str(r["reason"]), tuple(r["because"]))
+                for r in document["refusals"]
+            )
+            counts = {name: document[name] for name in _COUNTS if isinstance(document[name], int | float)}
+        except (KeyError, TypeError) as error:
+            raise InputError(f"Expected a plan's file as `neurosym plan --out` writes it; got {error!r}.") from None
         settings = _settings(*(document.get(key) for key in ("planner", "prior", "oracle")))
-        sentence = str(document.get("sentence", ""))
-        return cls(saved.plan, saved.how, sentence, True, refusals, counts, settings, scores)
+        return cls(saved.plan, saved.how, status, status.sentence, refusals, counts, settings, scores)
 
 
 _COUNTS = ("iterations", "attempts", "expansions", "seconds")
@@ -293,3 +305,19 @@ def problem_maker(query: Query, given: Mapping[str, Maker]) -> Callable[[], Prob
             raise InputError(f"Expected options that {what} takes; {error}.") from None
 
     return problem
+
+
+def check_query(query: Query) -> None:
+    """Refuse at once what would be refused in the thread.
+
+    Raises:
+        UnknownNameError: a planner, a prior or an oracle that nobody offers.
+        InputError: a budget that is none.
+    """
+    named = [("planner", query.planner, planner_names()), ("oracle", query.oracle, ORACLES)]
+    if query.prior is not None and not query.prior.endswith(".safetensors"):
+        named.append(("prior", query.prior, prior_names()))
+    for kind, name, known in named:
+        if name not in known:
+            raise UnknownNameError(kind, name, known)
+    Budget(seconds=query.seconds, attempts=query.attempts)

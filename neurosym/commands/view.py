@@ -1,0 +1,119 @@
+"""`neurosym view`: a local page that shows an assembly, a plan and its search, or a file that needs no server."""
+
+from __future__ import annotations
+
+import threading
+import webbrowser
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from neurosym.commands.common import CollapseRule, FamilyOptions, Oracle, OracleName, family_options, say
+from neurosym.errors import InputError
+
+if TYPE_CHECKING:
+    from neurosym.viewer.session import Shown
+    from neurosym.viewer.sources import Source
+
+#: Where the page listens unless told otherwise: this machine alone sees it.
+LOOPBACK = "127.0.0.1"
+
+
+def view(
+    target: Annotated[
+        str,
+        typer.Argument(
+            metavar="TARGET", help="A domain (`neurosym list` names them), a plan.json, or a file or folder to plan."
+        ),
+    ],
+    number: Annotated[
+        int | None, typer.Option("--problem", metavar="N", help="Number of the domain's problem; default 0.")
+    ] = None,
+    planner: Annotated[str, typer.Option("--planner", metavar="P", help="Name of a planner.")] = "backtracking",
+    prior: Annotated[
+        str, typer.Option("--prior", metavar="Q", help="Name of a prior, a weights file, or `none`.")
+    ] = "none",
+    option: FamilyOptions = None,
+    collapse: CollapseRule = None,
+    units: Annotated[
+        str | None, typer.Option("--units", metavar="U", help="What a length of 1 is in a file: mm, m, in, ...")
+    ] = None,
+    oracle: OracleName = Oracle.geometry,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Breaks ties; the same seed gives the same plan.")] = 0,
+    seconds: Annotated[float | None, typer.Option("--seconds", help="Budget: wall-clock time.")] = None,
+    attempts: Annotated[int | None, typer.Option("--attempts", help="Budget: questions to the oracle.")] = None,
+    host: Annotated[str, typer.Option("--host", help="Where to listen; 0.0.0.0 lets the whole network in.")] = LOOPBACK,
+    port: Annotated[
+        int, typer.Option("--port", min=0, max=65535, help="Where to listen; the next free one if taken, 0 any.")
+    ] = 8080,
+    browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in a browser.")] = True,
+    export: Annotated[
+        Path | None,
+        typer.Option("--export", metavar="FILE.html", help="Write a page that plays without a server, and exit."),
+    ] = None,
+) -> None:
+    """Look at a plan: step by step in 3D, with what the prior believed and where the search went."""
+    from neurosym.viewer import need_viser
+
+    need_viser()
+    from neurosym.viewer.export import check_name, export_page
+    from neurosym.viewer.session import Planning, Query, Shown, check_query
+    from neurosym.viewer.sources import open_source
+
+    if export is not None:
+        check_name(export)
+    options = ({} if collapse is None else {"collapse": collapse}) | ({} if units is None else {"units": units})
+    query = Query(
+        domain=target,
+        number=number,
+        options=options | family_options(option),
+        planner=planner,
+        prior=None if prior == "none" else prior,
+        oracle=oracle.value,
+        seed=seed,
+        seconds=seconds,
+        attempts=attempts,
+    )
+    check_query(query)
+    source = open_source(query)
+    shown = None if source.saved is None else Shown.saved(source.saved)
+    if export is None:
+        _serve(source, shown, host=host, port=port, browser=browser)
+        return
+    if shown is None:
+        planning = Planning(lambda: source.problem, source.query)
+        planning.wait()
+        if planning.shown is None:
+            raise InputError(planning.message or "")
+        shown = planning.shown
+    export_page(shown, export)
+    print(f"{export}: {shown.problem.name}, {len(shown.search.steps)} steps. {shown.search.sentence}")
+    raise typer.Exit(shown.search.status.exit_code)
+
+
+def _serve(source: Source, shown: Shown | None, *, host: str, port: int, browser: bool) -> None:
+    """Show the page until the keyboard ends it."""
+    from neurosym.viewer.page import Page
+    from neurosym.viewer.server import LocalServer
+
+    server = LocalServer(host, port, "neurosym")
+    page = Page(server, source.query, source.given)
+    try:
+        if shown is None:
+            page.plan(source.query, source.problem)
+        else:
+            page.show(shown)
+        where = "localhost" if host in ("0.0.0.0", "::") else host
+        address = f"http://{where}:{server.get_port()}"
+        print(f"{address} shows {source.problem.name}. Ctrl+C ends it.", flush=True)
+        if host != LOOPBACK:
+            say(f"Note: {host} is not this machine alone; who reaches the page can plan with it.")
+        if browser:
+            webbrowser.open(address)
+        threading.Event().wait()
+    except KeyboardInterrupt:
+        print("Ended.")
+    finally:
+        page.close()
+        server.stop()

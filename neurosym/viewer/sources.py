@@ -1,0 +1,102 @@
+"""What `neurosym view` is pointed at: a problem family, the file of a plan, or a user's own assembly."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from neurosym.errors import UnknownNameError
+from neurosym.language.domain import Problem
+from neurosym.plan_files import SavedPlan, problem_of, read_document, read_plan
+from neurosym.registry import domain_names, load_domain
+from neurosym.viewer.session import Maker, Query, problem_maker
+
+#: The family of assemblies that are files.
+ASSEMBLY = "assembly"
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """What there is to look at.
+
+    Attributes:
+        query: what the page asks for at first.
+        problem: the problem, made.
+        given: what bears no number in a family: name on the page -> what makes it, of options.
+        saved: the plan, where a file holds one.
+    """
+
+    query: Query
+    problem: Problem
+    given: Mapping[str, Maker]
+    saved: SavedPlan | None = None
+
+
+def open_source(query: Query) -> Source:
+    """Open the domain, or the file at the path, that `query.domain` names.
+
+    Raises:
+        UnknownNameError: neither a domain nor a path.
+        InputError: a file that is neither a plan nor an assembly.
+    """
+    path = Path(query.domain)
+    if query.domain in domain_names():
+        query = replace(query, number=query.number or 0)
+        return Source(query, problem_maker(query, {})(), {})
+    if not path.exists():
+        hint = f"There is no file or folder {query.domain!r} either."
+        raise UnknownNameError("domain", query.domain, domain_names(), hint=hint)
+    return _plan_at(path, query) if _is_plan(path) else _assembly_at(path, query)
+
+
+def _is_plan(path: Path) -> bool:
+    """Whether a file is a plan's: JSON that names a domain and steps. Anything else is left to the loader."""
+    if path.is_dir() or path.suffix.lower() != ".json":
+        return False
+    document = read_document(path)
+    return "domain" in document and "steps" in document
+
+
+def _plan_at(path: Path, query: Query) -> Source:
+    document = read_document(path)
+    if document.get("plan") is None:
+        # A search that found nothing is worth a look, too.
+        prefix = tuple(map(str, document.get("best_prefix") or ()))
+        saved = SavedPlan(problem_of(document, path), prefix, (), document)
+    else:
+        saved = read_plan(path)
+    options = document.get("options") or {}
+    settings = {key: document[key] for key in ("planner", "prior", "oracle", "seed") if document.get(key) is not None}
+    domain, number, given = document["domain"], document.get("number"), {}
+    if number is None:
+        domain = _name_for(path)
+        given = {domain: _again(document, path)}
+    query = Query(domain, number, options, seconds=query.seconds, attempts=query.attempts, **settings)
+    return Source(query, saved.problem, given, saved)
+
+
+def _again(document: Mapping[str, Any], path: Path) -> Maker:
+    def make(**options: Any) -> Problem:
+        return problem_of({**document, "options": options}, path)
+
+    return make
+
+
+def _assembly_at(path: Path, query: Query) -> Source:
+    family = load_domain(ASSEMBLY)
+
+    def make(**options: Any) -> Problem:
+        return family.problem(path, **options)
+
+    name = _name_for(path)
+    query = replace(query, domain=name, number=None)
+    given: dict[str, Maker] = {name: make}
+    return Source(query, problem_maker(query, given)(), given)
+
+
+def _name_for(path: Path) -> str:
+    """What a file is called on the page: unlike any domain."""
+    name = path.resolve().name
+    return f"{name} (a file)" if name in domain_names() else name
