@@ -1,7 +1,7 @@
 """A page to look at: the assembly in 3D, the plan as a film, and what the search knew and did.
 
-`timeline`, `facts`, `solids` and `panels` are pure: they know no server. `sources` opens what there is to see, `session`
-plans it, `page` shows it all with viser (extra `viewer`), and `export` writes a page that needs no server.
+`timeline`, `facts`, `solids` and `panels` are pure: they know no server. `sources` opens what there is to see,
+`session` plans it, `page` shows it all with viser (extra `viewer`), and `export` writes a page that needs no server.
 """
 
 from __future__ import annotations
