@@ -7,17 +7,15 @@ and body by body; every later question about a subset of the parts is bit arithm
 
 from __future__ import annotations
 
+import itertools
 from typing import TYPE_CHECKING
 
 import networkx as nx
 import numpy as np
 from numpy.typing import NDArray
 
-from neurosym.geometry import collision
-from neurosym.geometry.assembly import Box
-from neurosym.geometry.contacts import plane_axes
 from neurosym.geometry.directions import in_words
-from neurosym.geometry.sweep import swept_box_hits, triangles_block
+from neurosym.geometry.sweep import Sweep
 
 if TYPE_CHECKING:
     from neurosym.geometry.assembly import Assembly
@@ -43,16 +41,17 @@ class BlockingGraph:
         self.names = assembly.names
         self.into_table = (self.directions[:, 2] < -assembly.tolerances.parallel) & assembly.has_table
         self.queries = 0
-        self.by_body = [self._bodies_along(d) for d in self.directions]
-        owner_bits = [1 << int(o) for o in assembly.owners]
-        self.by_part = []
-        for along in self.by_body:
-            parts = [0] * len(assembly)
-            for body, blockers in enumerate(along):
-                owner = int(assembly.owners[body])
-                for other in bits(blockers):
-                    parts[owner] |= owner_bits[other]
-            self.by_part.append([mask & ~(1 << i) for i, mask in enumerate(parts)])
+        self.by_body: list[list[int]] = []
+        self.by_part: list[list[int]] = []
+        sweeps: list[Sweep] = []
+        for d, direction in enumerate(self.directions):
+            opposite = np.flatnonzero(np.linalg.norm(self.directions[:d] + direction, axis=1) < 1e-12)
+            # What hits what going one way is hit by it going the other.
+            sweep = sweeps[opposite[0]].reversed() if len(opposite) else Sweep.along(assembly, direction)
+            sweeps.append(sweep)
+            self.queries += sweep.queries
+            self.by_body.append(bitsets(sweep.hits, len(assembly.bodies)))
+            self.by_part.append(bitsets(assembly.owners[sweep.hits], len(assembly)))
 
     def blockers(self, part: int, direction: int, among: int) -> int:
         """Bitset of those parts in `among` that part number `part` would hit along direction number `direction`."""
@@ -141,48 +140,17 @@ class BlockingGraph:
         """A direction in words: ``+z``, or its three numbers."""
         return in_words(self.vectors[direction])
 
-    def _bodies_along(self, direction: Array) -> list[int]:
-        """One direction: candidate pairs by swept bounds, whole at once, then the exact test on what is left."""
-        assembly = self.assembly
-        low, high = self._bounds_along(direction)
-        margin = assembly.touch
-        across = (low[:, None, :2] + margin < high[None, :, :2]) & (high[:, None, :2] - margin > low[None, :, :2])
-        ahead = high[None, :, 2] > low[:, None, 2] + margin
-        pairs = across.all(axis=2) & ahead & (assembly.owners[:, None] != assembly.owners[None])
-        shapes = [b.shape for b in assembly.bodies]
-        reach = float(high[:, 2].max() - low[:, 2].min()) + assembly.smallest_extent
-        found = [0] * len(shapes)
-        objects: dict[int, object] = {}
-        for i in range(len(shapes)):
-            others = np.flatnonzero(pairs[i])
-            if not len(others):
-                continue
-            self.queries += len(others)
-            box_others = [int(j) for j in others if isinstance(shapes[j], Box)]
-            if isinstance(shapes[i], Box) and box_others:
-                for j in box_others:
-                    if j not in objects:
-                        objects[j] = collision.box_object(shapes[j].size, assembly.X_WB[j])  # type: ignore[union-attr]
-                hits = swept_box_hits(
-                    assembly, i, direction, reach, [objects[j] for j in box_others], box_others
-                )
-                others = np.setdiff1d(others, box_others)
-            else:
-                hits = []
-            hits += [int(j) for j in others if triangles_block(assembly, i, int(j), direction)]
-            found[i] = sum(1 << j for j in hits)
-        return found
 
-    def _bounds_along(self, direction: Array) -> tuple[Array, Array]:
-        """Bounds (n, 3) of all bodies in a frame whose last axis is the direction, along the others if it can be."""
-        u, v = plane_axes(direction)
-        for other in self.directions:
-            if abs(other @ direction) < 1e-9:
-                u, v = other, np.cross(direction, other)
-                break
-        frame = np.stack([u, v, direction], axis=1)
-        corners = [self.assembly.body_vertices(i) @ frame for i in range(len(self.assembly.bodies))]
-        return np.array([c.min(axis=0) for c in corners]), np.array([c.max(axis=0) for c in corners])
+def bitsets(pairs: NDArray[np.int64], count: int) -> list[int]:
+    """For pairs (i, j), int64 (k, 2), of numbers below `count`: per i, a bitset of its j."""
+    found = []
+    order = np.argsort(pairs[:, 0], kind="stable")
+    ends = np.searchsorted(pairs[order, 0], np.arange(count + 1))
+    for start, stop in itertools.pairwise(ends):
+        row = np.zeros(count, dtype=bool)
+        row[pairs[order[start:stop], 1]] = True
+        found.append(int.from_bytes(np.packbits(row, bitorder="little").tobytes(), "little"))
+    return found
 
 
 def bits(mask: int) -> list[int]:

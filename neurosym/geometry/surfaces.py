@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -10,11 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
+from neurosym.geometry.broad_phase import Pairs, spans
+
 if TYPE_CHECKING:
     from neurosym.geometry.assembly import Assembly
 
 Array = NDArray[np.float64]
 Numbers = NDArray[np.int64]
+
+#: So many pairs of a facet and a vertex are held at a time.
+_AT_A_TIME = 2_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,3 +88,25 @@ def _surfaces(assembly: Assembly, *, hulls: bool) -> Surfaces:
     body = body[kept]
     first = np.searchsorted(body, np.arange(len(faces) + 1))
     return Surfaces(triangles[kept], normals, body, first, points, first_vertex)
+
+
+def facet_distances(hulls: Surfaces, pairs: Pairs) -> Iterator[tuple[Numbers, Numbers, Array]]:
+    """How far the vertices of b lie outside each facet of a, at the least, for pairs of bodies int64 (k, 2).
+
+    Yields, a batch of pairs at a time, the pair, the facet and the distance (length, below 0 where b reaches inside).
+    """
+    facets = np.diff(hulls.first)[pairs[:, 0]]
+    vertices = np.diff(hulls.first_vertex)[pairs[:, 1]]
+    batch = np.cumsum(facets * vertices) // _AT_A_TIME
+    for rows in np.split(np.arange(len(pairs)), np.flatnonzero(np.diff(batch)) + 1):
+        if not len(rows):
+            continue
+        run, place = spans(facets[rows])
+        pair = rows[run]
+        facet = hulls.first[pairs[pair, 0]] + place
+        run, place = spans(vertices[pair])
+        vertex = hulls.first_vertex[pairs[pair[run], 1]] + place
+        along = np.einsum("nd,nd->n", hulls.normals[facet[run]], hulls.vertices[vertex])
+        starts = np.cumsum(vertices[pair]) - vertices[pair]
+        least = np.minimum.reduceat(along, starts)
+        yield pair, facet, least - np.einsum("nd,nd->n", hulls.normals[facet], hulls.middles[facet])
