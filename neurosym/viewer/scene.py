@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from typing import Any
 
@@ -24,8 +25,9 @@ MOST_NAMES = 12
 #: How opaque parts are while another one is selected.
 FAINT = 0.22
 
-#: The camera's field of view (radians, top to bottom), and its distance as a share of the diagonal of all that is seen.
-FIELD_OF_VIEW, DISTANCE = 0.7, 1.3
+#: The camera's field of view (radians, top to bottom), where it looks from (the front, a little from the right, from
+#: above), and how much more than all that is ever seen it takes in.
+FIELD_OF_VIEW, FROM, MARGIN = 0.7, np.array([0.35, -0.75, 0.56]), 1.05
 
 _EDGE, _PICKED = (45, 45, 45), (213, 94, 0)
 
@@ -66,7 +68,7 @@ class PlanScene:
         low, high = assembly.bounds
         self.scale = SIZE / float((high - low).max())
         self.origin = np.array([*(low[:2] + high[:2]) / 2, floor_of(assembly)])
-        thick = 0.004 * SIZE
+        thick = 0.0035 * SIZE
         for i, solid in enumerate(solids(assembly)):
             name = assembly.names[i]
             colour = timeline.staging.colours.get(name, palette_colour(i))
@@ -122,10 +124,16 @@ class PlanScene:
         )
 
     def _look(self, timeline: Timeline) -> None:
-        """Cameras look at all of it from the front, a little from the right and from above."""
+        """Place the cameras as near as they can be and still see all of the film in a square window."""
         low, high = self._to_scene(timeline.bounds())
-        middle, reach = (low + high) / 2, float(np.linalg.norm(high - low))
-        eye = middle + DISTANCE * reach * np.array([0.35, -0.75, 0.56])
+        middle, back = (low + high) / 2, FROM / np.linalg.norm(FROM)
+        right = np.cross([0.0, 0.0, 1.0], back)
+        right /= np.linalg.norm(right)
+        corners = (np.array(list(itertools.product(*zip(low, high)))) - middle) @ np.stack(
+            [right, np.cross(back, right), back], axis=1
+        )
+        away = corners[:, 2] + np.abs(corners[:, :2]).max(axis=1) * MARGIN / np.tan(FIELD_OF_VIEW / 2)
+        eye = middle + float(away.max()) * back
         camera = self.server.initial_camera
         camera.position, camera.look_at, camera.up = tuple(eye), tuple(middle), (0.0, 0.0, 1.0)
         camera.fov = FIELD_OF_VIEW

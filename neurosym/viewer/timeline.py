@@ -129,16 +129,21 @@ class Timeline:
         return seen if t == step else seen | (self.where[step + 1] != ABSENT)
 
     def bounds(self) -> Array:
-        """float64 (2, 3): bounds of all that is to be seen at any whole time."""
+        """float64 (2, 3): bounds of what is to be seen at whole times, and at the outer ends of all paths."""
         boxes = self.bounds_at_rest[None] + self.shifts[:, :, None]
-        seen = boxes[self.where != ABSENT] if self.where.any() else self.bounds_at_rest
-        return np.stack([seen[:, 0].min(axis=0), seen[:, 1].max(axis=0)])
+        seen = [boxes[self.where != ABSENT] if self.where.any() else self.bounds_at_rest]
+        for number, (motion, movers) in enumerate(zip(self._motions, self._movers)):
+            middle, end = self._middle(number), motion.path[-1]
+            shift = end[:3, :3] @ middle + end[:3, 3] - middle
+            seen.append(self.bounds_at_rest[movers] + self._base(number) + shift)
+        all_seen = np.concatenate(seen)
+        return np.stack([all_seen[:, 0].min(axis=0), all_seen[:, 1].max(axis=0)])
 
     def path_of(self, step: int) -> Array:
         """float64 (k, 3): the way of the middle of what moves in a step, out from where it rests."""
         number = self._played(step)
-        motion, base = self._motions[number], self._base(number)
-        way: Array = motion.path[:, :3, :3] @ motion.centre + motion.path[:, :3, 3] + base
+        path, middle = self._motions[number].path, self._middle(number)
+        way: Array = path[:, :3, :3] @ middle + path[:, :3, 3] + self._base(number)
         return way
 
     def _within(self, t: float) -> float:
@@ -161,6 +166,12 @@ class Timeline:
         base: Array = self._at(number + 1 if motion.arrives else number)[movers[0]]
         return base
 
+    def _middle(self, number: int) -> Array:
+        """float64 (3,): the middle of what a motion moves, at rest in the work."""
+        boxes = self.bounds_at_rest[self._movers[number]]
+        middle: Array = (boxes[:, 0].min(axis=0) + boxes[:, 1].max(axis=0)) / 2
+        return middle
+
     def _under_way(self, step: int, share: float) -> dict[str, Array]:
         """Name -> float64 (4, 4): the motions of the parts that move, when `share` of a step's time has passed."""
         number = self._played(step)
@@ -175,17 +186,16 @@ class Timeline:
         moved = {name: base @ X for name, X in motion.where(1 - share).items()}
         arrives = self._motions[number].arrives
         there = self._at(number if arrives else number + 1)[self._movers[number][0]]
-        carried = self._carried(base @ motion.path[-1], there, motion, share)
+        carried = self._carried(base @ motion.path[-1], there, self._middle(number), share)
         return moved | dict.fromkeys(motion.parts, carried)
 
-    def _carried(self, end: Array, there: Array, motion: Motion, share: float) -> Array:
+    def _carried(self, end: Array, there: Array, middle: Array, share: float) -> Array:
         """float64 (4, 4): on the way from the end of the path, over everything, to where it is set down."""
         last = shifted(there)
         over_end, over_last = end.copy(), last.copy()
-        height = end[2, :3] @ motion.centre + end[2, 3]
-        over_end[2, 3] += max(self._top - height, 0.0)
-        over_last[2, 3] = max(self._top - motion.centre[2], last[2, 3])
-        return pose_along(np.stack([end, over_end, over_last, last]), share, motion.centre)
+        over_end[2, 3] += max(self._top - float(end[2, :3] @ middle + end[2, 3]), 0.0)
+        over_last[2, 3] = max(self._top - float(middle[2]), float(last[2, 3]))
+        return pose_along(np.stack([end, over_end, over_last, last]), share, middle)
 
     @cached_property
     def _top(self) -> float:
