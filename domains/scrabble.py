@@ -23,6 +23,7 @@ from neurosym.demonstrations import Demonstrations
 from neurosym.errors import InputError, UnknownNameError
 from neurosym.family import ProblemFamily, Progress
 from neurosym.language import Atom, Problem
+from neurosym.motions import Staging
 
 #: How many problems of a part are meant where nobody says how many: enough for `compare`, and for its blind baseline.
 DEFAULT_COUNTS = {"train": 50, "test": 200}
@@ -90,7 +91,14 @@ class ScrabbleFamily(ProblemFamily):
         names = scrabble_tiles.first_tiles(tiles)
         letters = scrabble_tiles.checked_word(word, tiles)
         style = style_named(pictures)
-        init = _initial(letters, tuple(start), names)
+        first = tuple(start)
+        init = _initial(letters, first, names)
+
+        def stage(plan: Sequence[str], how: Sequence[Any] = ()) -> Staging:
+            from domains.scrabble_staging import laid_out
+
+            return laid_out(first, plan)
+
         return DOMAIN.problem(
             world=Reference(letters, names, len(init)),
             objects={tile: names},
@@ -100,6 +108,7 @@ class ScrabbleFamily(ProblemFamily):
             name=name or letters,
             family=self.name,
             observe=lambda: draw_word(letters, style, np.random.default_rng(seed)),
+            stage=stage,
             details={"word": letters, "tiles": len(names), "pictures": style.name, "seed": seed},
         )
 

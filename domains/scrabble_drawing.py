@@ -161,6 +161,22 @@ def _tile(letter: str, cut: int) -> Image.Image:
     tile = Image.new("RGBA", (_SQUARE, _SQUARE), (10, 8, 5, 0))
     tile.putalpha(shadow.filter(ImageFilter.GaussianBlur(1.6)))
 
+    face = _face(letter, cut)
+    shape = Image.new("L", (_TILE, _TILE))
+    ImageDraw.Draw(shape).rounded_rectangle((0, 0, _TILE - 1, _TILE - 1), 5, fill=255)
+    face.putalpha(shape)
+    tile.alpha_composite(face, box[:2])
+    return tile.convert("RGBa")
+
+
+def tile_face(letter: str) -> NDArray[np.uint8]:
+    """What the top of a tile looks like, uint8 (54, 54, 3)."""
+    face: NDArray[np.uint8] = np.asarray(_face(letter, 0).convert("RGB"))
+    return face
+
+
+def _face(letter: str, cut: int) -> Image.Image:
+    """The top of a tile, 54 x 54: wood, letter and points."""
     face = Image.fromarray(_wood(np.random.default_rng([ord(letter), cut]))).convert("RGBA")
     draw = ImageDraw.Draw(face)
     draw.rounded_rectangle((0, 0, _TILE - 1, _TILE - 1), 5, outline=(118, 84, 48), width=1)
@@ -170,11 +186,7 @@ def _tile(letter: str, cut: int) -> Image.Image:
     middle = (_TILE / 2 - 2, _TILE / 2 - 2)
     draw.text(middle, letter.upper(), fill=ink, font=_font(38), anchor="mm", stroke_width=1, stroke_fill=ink)
     draw.text((_TILE - 5, _TILE - 4), str(VALUES[letter]), fill=ink, font=_font(14), anchor="rs")
-    shape = Image.new("L", (_TILE, _TILE))
-    ImageDraw.Draw(shape).rounded_rectangle((0, 0, _TILE - 1, _TILE - 1), 5, fill=255)
-    face.putalpha(shape)
-    tile.alpha_composite(face, box[:2])
-    return tile.convert("RGBa")
+    return face
 
 
 def _wood(rng: np.random.Generator) -> NDArray[np.uint8]:

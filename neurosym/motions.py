@@ -82,17 +82,19 @@ class Staging:
         present: names of those that are there before the first step.
         motions: one a step.
         colours: part name -> RGB in 0..1, for parts with a colour of their own.
+        tops: part name -> what lies on its top, uint8 (H, W, 3), for parts that bear a picture.
     """
 
     assembly: Assembly
     present: tuple[str, ...]
     motions: tuple[Motion, ...]
     colours: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
+    tops: Mapping[str, NDArray[np.uint8]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         known = set(self.assembly.names)
         moving = (n for m in self.motions for names in (m.parts, *(group[0] for group in m.aside)) for n in names)
-        for name in (*self.present, *self.colours, *moving):
+        for name in (*self.present, *self.colours, *self.tops, *moving):
             if name not in known:
                 raise UnknownNameError("part", name, known)
 

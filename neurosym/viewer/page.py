@@ -16,7 +16,7 @@ from neurosym.pipeline import ORACLES
 from neurosym.registry import domain_names, planner_names, prior_names
 from neurosym.viewer import panels
 from neurosym.viewer.facts import part_facts
-from neurosym.viewer.scene import MOST_NAMES, PlanScene
+from neurosym.viewer.scene import PlanScene, named_at_first
 from neurosym.viewer.server import LocalServer
 from neurosym.viewer.session import REFUSED, Maker, Planning, Query, Shown, check_query, problem_maker
 
@@ -70,7 +70,7 @@ class Page:
             _assign(self.slider, 0.0)
             self.part.options = (NO_PART, *(timeline.names if timeline else ()))
             _assign(self.part, NO_PART)
-            _assign(self.names, 0 < len(self.scene.parts) <= MOST_NAMES)
+            _assign(self.names, named_at_first(shown.timeline))
             self._fill(shown)
             self._moved(0.0)
 

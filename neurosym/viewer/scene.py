@@ -29,7 +29,15 @@ FAINT = 0.22
 #: above), and how much more than all that is ever seen it takes in.
 FIELD_OF_VIEW, FROM, MARGIN = 0.7, np.array([0.35, -0.75, 0.56]), 1.05
 
+#: Turns a picture, which faces along -z with its top at -y, so that it lies face up with its top at +y.
+_UPWARD = (0.0, 1.0, 0.0, 0.0)
+
 _EDGE, _PICKED = (45, 45, 45), (213, 94, 0)
+
+
+def named_at_first(timeline: Timeline | None) -> bool:
+    """Whether parts bear their names before anybody asks: where they are few, and no picture says what they are."""
+    return timeline is not None and len(timeline.names) <= MOST_NAMES and not timeline.staging.tops
 
 
 class PlanScene:
@@ -86,12 +94,22 @@ class PlanScene:
                     f"/work/{i}/edges", outline, _EDGE, thickness=thick * min(1.0, 6.0 / len(assembly) ** 0.5)
                 )
                 self._outlines.append(edges)
+            if name in timeline.staging.tops:
+                size = np.ptp(timeline.bounds_at_rest[i], axis=0) * self.scale
+                scene.add_image(
+                    f"/work/{i}/top",
+                    timeline.staging.tops[name],
+                    *(0.98 * size[:2]),
+                    format="png",
+                    wxyz=_UPWARD,
+                    position=(0.0, 0.0, 0.51 * size[2]),
+                )
             tag = scene.add_label(
                 f"/work/{i}/name",
                 name,
                 font_screen_scale=0.9,
                 anchor="center-center",
-                visible=len(assembly) <= MOST_NAMES,
+                visible=named_at_first(timeline),
             )
             self.parts.append(node)
             self._names.append(tag)

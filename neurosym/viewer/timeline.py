@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 from neurosym.errors import InputError
 from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.motions import shifted
-from neurosym.motions import Motion, Staging, pose_along
+from neurosym.motions import Staging, pose_along
 
 Array = NDArray[np.float64]
 
