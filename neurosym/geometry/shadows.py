@@ -201,11 +201,11 @@ def _products(shadows: Shadows, pairs: Pairs, asked: Numbers) -> Iterator[tuple[
         i = shadows.lower[shadows.first_lower[a[row]] + place // uppers[row]]
         j = shadows.upper[shadows.first_upper[b[row]] + place % uppers[row]]
         yield asked[row], i, j
-    for row in map(int, np.flatnonzero(many)):
-        i = shadows.lower[shadows.first_lower[a[row]] : shadows.first_lower[a[row] + 1]]
-        j = shadows.upper[shadows.first_upper[b[row]] : shadows.first_upper[b[row] + 1]]
+    for big in np.flatnonzero(many):
+        i = shadows.lower[shadows.first_lower[a[big]] : shadows.first_lower[a[big] + 1]]
+        j = shadows.upper[shadows.first_upper[b[big]] : shadows.first_upper[b[big] + 1]]
         boxes = [shapely.box(*shadows.low[t, :2].T, *shadows.high[t, :2].T) for t in (i, j)]
         tree = shapely.STRtree(boxes[1])
         for start in range(0, len(i), _QUERIES_AT_A_TIME):
             first, second = tree.query(boxes[0][start : start + _QUERIES_AT_A_TIME])
-            yield np.full(len(first), asked[row]), i[start + first], j[second]
+            yield np.full(len(first), asked[big]), i[start + first], j[second]
