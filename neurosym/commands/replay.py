@@ -85,7 +85,7 @@ def _show(name: str, report: ReplayReport) -> None:
     console(table).print(table)
     failed = report.failed_at
     if failed is None:
-        print(f"The rest stood still at all {len(report.steps)} steps; to move is to go more than {report.threshold:.3g}.")
+        print(f"The rest stood still at all {len(report.steps)} steps (what goes by {report.threshold:.3g} has moved).")
     elif failed < 0:
         print(f"The assembly does not stand before the first step. {report.start.reason}")
     else:

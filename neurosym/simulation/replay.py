@@ -318,7 +318,7 @@ def _reason(
     elif farthest is None:
         said.append("Nothing is left.")
     elif not said:
-        said.append(f"The rest stood still; {farthest} moved most, by {distance:.2g}: {share:.2%} of the smallest part.")
+        said.append(f"The rest stood still; {farthest} moved by {distance:.2g}, {share:.2%} of the smallest part.")
     return " ".join(said)
 
 
