@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from domains.assembly_groups import apart_in_groups
 from domains.assembly_removal import apart_one_by_one
 from domains.assembly_samples import SAMPLES, TRAINING, sample
 from neurosym.errors import AssemblyError, InputError, UnknownNameError
@@ -111,9 +112,8 @@ class AssemblyFamily(ProblemFamily):
             "fixed": list(assembly.fixed),
             **{key: getattr(setting, key) for key in ("paths", "groups", "gravity", "held")},
         }
-        return apart_one_by_one(
-            assembly, setting, before=before, name=name or called, family=self.name, details=details
-        )
+        make = apart_in_groups if groups else apart_one_by_one
+        return make(assembly, setting, before=before, name=name or called, family=self.name, details=details)
 
     def numbers(self, part: str = "test", *, split: int = 0) -> tuple[int, ...]:
         """Numbers of the samples: see `domains.assembly_samples`."""

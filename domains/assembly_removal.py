@@ -7,13 +7,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from domains.assembly_paths import ground_of, way_out
+from domains.assembly_why import explain_removal
 from neurosym import predicates
 from neurosym.geometry.assembly import Assembly
+from neurosym.geometry.blocking import bits
 from neurosym.geometry.sweep import exits_along
 from neurosym.language import Action, Derived, Domain, Fluent, Problem, Simulation, State, Type
 from neurosym.problem import Verdict
 from neurosym.ways import Way
-from neurosym.why_not import listed
+from neurosym.why_not import GROUND, listed
 
 if TYPE_CHECKING:
     from domains.assembly import Setting
@@ -38,6 +41,7 @@ def apart_one_by_one(
     if setting.gravity:
         geometry += [stands_at_first(setting)(), predicates.stable_without(present, held=setting.held)(_p)]
     remove = Action("remove", _p, pre=[present(_p), ~fixed(_p), *geometry], eff=[~present(_p)], label="{p}")
+    pairs = tuple(before)
     loose = [n for n in assembly.names if n not in assembly.fixed]
     judged_alike = setting.gravity and not setting.held and not assembly.fixed and setting.paths == "straight"
     return Domain("assembly", fluents=[present, fixed], actions=[remove]).problem(
@@ -45,33 +49,49 @@ def apart_one_by_one(
         objects={part: assembly.names},
         init=[*(present(n) for n in assembly.names), *(fixed(n) for n in assembly.fixed)],
         goal=[~present(n) for n in loose],
-        before=before,
+        before=pairs,
         name=name,
         family=family,
         simulation=Simulation("rigid", {n: n for n in loose}) if judged_alike else None,
         details=details,
+        explain=lambda result: explain_removal(assembly, setting, pairs, result),
     )
 
 
 def can_leave(setting: Setting) -> Derived:
-    """``free(p)``: part p can leave; the `how` is a `Way`."""
+    """``free(p)``: part p can leave, along a straight line or else, if paths are asked for, along a path."""
     straight = predicates.free(present, directions=setting.directions)
 
     def ask(world: Assembly, state: State, p: str) -> Verdict:
         verdict = straight.function(world, state, p)
         if verdict.holds:
             return Verdict(True, (), verdict.reason, how=Way.along((p,), verdict.how))
-        return verdict
+        if setting.paths == "straight":
+            return verdict
+        found = way_out(world, 1 << world.index[p], state.mask(present, world.names))
+        if isinstance(found, tuple):
+            reason, met, proved = found
+            return Verdict(False, met, reason, proved=proved)
+        return Verdict(True, (), f"{p} is free by a path.", how=Way((p,), path=found))
 
     def check(world: Assembly, state: State, how: Any, p: str) -> Verdict:
-        others = [world.index[n] for n in state.objects(present) if n != p]
-        if not isinstance(how, Way) or how.direction is None or how.parts != (p,):
+        if not isinstance(how, Way) or how.parts != (p,):
             return ask(world, state, p)
+        there = state.mask(present, world.names)
+        if how.path is not None:
+            if setting.paths == "straight" or how.path.leaving != (p,):
+                return Verdict(False, (p,), f"{p} cannot go {how}: that is no straight line of its own.")
+            clear = how.path.check(world, there, ground=ground_of(world))
+            return Verdict(clear.holds, clear.parts, clear.reason or f"{p} is free {how}.", how=how)
         direction = np.array(how.direction)
-        hit = world.in_mask(sum(1 << o for o in exits_along(world, world.index[p], direction, others)))
-        down = world.has_table and direction[2] < -world.tolerances.parallel
-        if hit or down:
-            return Verdict(False, hit, f"{p} cannot go {how}: {', '.join(hit) or 'the table'} is in the way.")
+        if min(np.abs(direction - d).max() for d in setting.directions) > 1e-9:
+            return Verdict(False, (p,), f"{p} cannot go {how}: that is none of the problem's directions.")
+        hit = exits_along(world, world.index[p], direction, bits(there & ~(1 << world.index[p])))
+        names = tuple(world.names[o] for o in hit)
+        if world.has_table and direction[2] < -world.tolerances.parallel:
+            names = (*names, GROUND)
+        if names:
+            return Verdict(False, tuple(n for n in names if n != GROUND), f"{p} cannot go {how}: {listed(names)}.")
         return Verdict(True, (), f"{p} is free {how}.", how=how)
 
     return Derived("free", [part], ask, check=check)

@@ -10,6 +10,7 @@ import numpy as np
 from neurosym.errors import InputError
 from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.blocking import bits
+from neurosym.geometry.directions import Directions
 from neurosym.prior import OrderScores, Prior
 
 if TYPE_CHECKING:
@@ -19,8 +20,9 @@ if TYPE_CHECKING:
 class OutermostFirst(Prior):
     """Peels an assembly like an onion: first the parts that nothing blocks, then those that only these blocked, ...
 
-    Within a layer the topmost comes first, then the farthest from the middle. Parts that never come free by
-    themselves are last. Geometry alone, along the problem's directions: no pictures, no gravity.
+    Under gravity a layer has only parts with nothing above them, as long as there are such. Within a layer the topmost
+    comes first, then the farthest from the middle; parts that never come free by themselves are last. Geometry alone,
+    along the problem's directions: no pictures, and no question whether anything falls.
 
     Args:
         decay: how many steps away from its place in this order a part is e times less likely (steps).
@@ -49,16 +51,18 @@ class OutermostFirst(Prior):
                 "Expected a problem whose world is an Assembly and whose actions are named after its parts, for the "
                 f"prior outermost-first; {problem.name!r} has the action {strange[0]!r}."
             )
-        rank = {name: place for place, name in enumerate(outermost_order(world, problem.details.get("directions")))}
+        details = problem.details
+        order = outermost_order(world, details.get("directions"), gravity=details.get("gravity", True))
+        rank = {name: place for place, name in enumerate(order)}
         place = np.argsort(np.argsort([rank[n] for n in parts]))
         steps = np.arange(len(parts))
         table = -np.abs(steps[:, None] - place[None, :]) / self.decay
         return OrderScores(table, problem.actions, classes=problem.classes)
 
 
-def outermost_order(assembly: Assembly, directions: object = None) -> list[str]:
+def outermost_order(assembly: Assembly, directions: Directions = None, *, gravity: bool = True) -> list[str]:
     """Names of all parts, the outermost first, fixed ones last."""
-    graph = assembly.blocking(directions)  # type: ignore[arg-type]
+    graph, up = assembly.blocking(directions), assembly.blocking("+z")
     fixed = assembly.fixed_mask
     left = (1 << len(assembly)) - 1 & ~fixed
     bounds = [assembly.body_bounds[assembly.owners == i] for i in range(len(assembly))]
@@ -68,7 +72,9 @@ def outermost_order(assembly: Assembly, directions: object = None) -> list[str]:
     distance = [float(np.linalg.norm(own.mean(axis=(0, 1)) - middle)) for own in bounds]
     order: list[int] = []
     while left:
-        layer = [i for i in bits(left) if graph.free_directions(i, left | fixed)] or bits(left)
+        free = [i for i in bits(left) if graph.free_directions(i, left | fixed)] or bits(left)
+        topmost = [i for i in free if not up.blockers(i, 0, left | fixed)] if gravity else []
+        layer = topmost or free
         layer.sort(key=lambda i: (-height[i], -distance[i], i))
         order += layer
         left &= ~sum(1 << i for i in layer)

@@ -10,10 +10,20 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 import typer
 
+from neurosym.commands.assemblies import (
+    Directions,
+    Fixed,
+    Gravity,
+    Groups,
+    Held,
+    PathsOption,
+    Units,
+    load_assembly,
+    removal_options,
+)
 from neurosym.commands.common import (
     AsJson,
     CollapseRule,
-    DomainName,
     FamilyOptions,
     Oracle,
     OracleName,
@@ -29,17 +39,28 @@ from neurosym.errors import InputError
 from neurosym.family import ProblemFamily
 from neurosym.geometry.directions import in_words
 from neurosym.plan_files import SCHEMA
+from neurosym.ways import Way
 
 if TYPE_CHECKING:
     from neurosym.language.domain import Problem
     from neurosym.planner import PlanResult
+
+#: The prior for assemblies, unless another is named.
+UNTRAINED = "outermost-first"
 
 #: Refusals shown at the end of a search that found nothing; --out keeps all.
 LAST_REFUSALS = 12
 
 
 def plan(
-    domain: DomainName,
+    what: Annotated[
+        str,
+        typer.Argument(
+            metavar="PATH|DOMAIN",
+            help="An assembly of yours (a folder with one mesh a part, a scene, a puzzle, an assembly's JSON), or a "
+            "problem family; `neurosym list` names them.",
+        ),
+    ],
     number: Annotated[int | None, typer.Option("--problem", metavar="N", help="Number of the problem.")] = None,
     cells: Annotated[
         Path | None, typer.Option("--cells", metavar="FILE", help='A puzzle of yours: JSON {"name": [[x,y,z], ...]}.')
@@ -48,8 +69,13 @@ def plan(
         str | None, typer.Option("--planner", metavar="P", help="Default backtracking; with --k best-first.")
     ] = None,
     prior: Annotated[
-        str, typer.Option("--prior", metavar="Q", help="Name of a prior, a weights file, or `none`.")
-    ] = "none",
+        str | None,
+        typer.Option(
+            "--prior",
+            metavar="Q",
+            help="Name of a prior, a weights file, or `none`. Default none; for an assembly outermost-first.",
+        ),
+    ] = None,
     option: FamilyOptions = None,
     collapse: CollapseRule = None,
     oracle: OracleName = Oracle.geometry,
@@ -65,24 +91,49 @@ def plan(
     removed: Annotated[
         list[str] | None, typer.Option("--removed", metavar="V", help="Is gone already. May be repeated.")
     ] = None,
+    units: Units = None,
+    directions: Directions = None,
+    paths: PathsOption = None,
+    groups: Groups = None,
+    gravity: Gravity = None,
+    held: Held = None,
+    fixed: Fixed = None,
     out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="Keep it all as JSON.")] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Plan one problem, and show each step with the refusals that led to it."""
+    """Plan one problem, and show each step with the refusals that led to it; or why there is no plan.
+
+    For an assembly the plan takes it apart; backwards, it puts it together.
+    """
+    from neurosym.assembly_files import reference
     from neurosym.benchmark import NO_PRIOR
     from neurosym.pipeline import plans, solve
     from neurosym.planner import Budget
     from neurosym.registry import load_domain
 
-    family = load_domain(domain)
+    path = _path(what, number, cells)
+    family = load_domain("assembly" if path else what)
     options = problem_options(
         family,
         collapse=collapse,
         pictures=None if pictures is Pictures.clean else pictures.value,
         before=[_pair(text) for text in before] if before else None,
         removed=removed or None,
-    ) | family_options(option)
-    problem = _problem(family, number, cells, options)
+    )
+    options |= removal_options(directions, paths, groups, gravity, held, fixed) | family_options(option)
+    source: dict[str, Any] = {}
+    if path is None:
+        if units is not None:
+            raise InputError(f"Expected --units with the files of an assembly; {what!r} is a problem family.")
+        problem = _problem(family, number, cells, options)
+        # Pieces of the user's own travel with their plan, so that it can be shown and replayed.
+        source = {} if cells is None else {"cells": _cells(cells)}
+    else:
+        assembly = load_assembly(path, units)
+        problem = _made(family, assembly, options | {"name": path.resolve().name})
+        source = {"assembly": reference(path, units, assembly)}
+    if prior is None:
+        prior = NO_PRIOR if path is None else UNTRAINED
     chosen = planner or ("backtracking" if k is None else "best-first")
     budget = Budget(seconds=seconds, attempts=attempts, expansions=expansions)
     settings: dict[str, Any] = {
@@ -96,9 +147,8 @@ def plan(
         # The k best of none: ask for one, to be told why there is none.
         results = [solve(problem, rng=np.random.default_rng(seed), **settings)]
     answer = {
-        **_header(domain, problem, number, options),
-        # Pieces of the user's own travel with their plan, so that it can be shown and replayed.
-        **({} if cells is None else {"cells": _cells(cells)}),
+        **_header(family.name, problem, number, options),
+        **source,
         **settings,
         "budget": budget.limits,
         "seed": seed,
@@ -115,6 +165,18 @@ def plan(
     raise typer.Exit(results[0].status.exit_code)
 
 
+def _path(what: str, number: int | None, cells: Path | None) -> Path | None:
+    """The path, if that is what was given; a family's name wins where its problem is named, too."""
+    from neurosym.registry import domain_names
+
+    path = Path(what)
+    if path.exists() and number is None and cells is None:
+        return path
+    if what not in domain_names() and (path.parent != Path() or path.suffix):
+        raise InputError(f"Expected a problem family or the path of an assembly; there is nothing at {what}.")
+    return None
+
+
 def _each_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     """A JSON object whose keys differ: of two pieces of one name, JSON itself would silently drop the first."""
     names = [key for key, _ in pairs]
@@ -128,15 +190,19 @@ def _problem(family: ProblemFamily, number: int | None, cells: Path | None, opti
     if (number is None) == (cells is None):
         raise InputError("Expected either --problem N or --cells FILE, one of them.")
     if cells is None:
-        try:
-            return family.problem(number, **options)
-        except TypeError as error:
-            raise InputError(f"Expected options that problems of {family.name!r} take; {error}.") from None
+        return _made(family, number, options)
     make = getattr(family, "problem_from_cells", None)
     if make is None:
         raise InputError(f"Expected a domain of polycube puzzles (soma) for --cells; {family.name!r} is none.")
     problem: Problem = make(_cells(cells), **options)
     return problem
+
+
+def _made(family: ProblemFamily, given: Any, options: dict[str, Any]) -> Problem:
+    try:
+        return family.problem(given, **options)
+    except TypeError as error:
+        raise InputError(f"Expected options that problems of {family.name!r} take; {error}.") from None
 
 
 def _cells(path: Path) -> dict[str, Any]:
@@ -169,7 +235,7 @@ def _result(result: PlanResult) -> dict[str, Any]:
         "status": result.status.name,
         "sentence": result.status.sentence,
         "plan": None if result.plan is None else list(result.plan),
-        "steps": [{"action": a, "how": how} for a, how in zip(result.plan or (), hows)],
+        "steps": [{"action": a, **_said(how)} for a, how in zip(result.plan or (), hows)],
         "best_prefix": list(result.best_prefix),
         "refusals": [
             {"after": list(r.after), "action": r.action, "reason": r.reason, "because": list(r.because)}
@@ -180,7 +246,13 @@ def _result(result: PlanResult) -> dict[str, Any]:
         "attempts": result.attempts,
         "seconds": result.seconds,
         "cost": result.cost,
+        "why_not": None if result.why_not is None else result.why_not.as_json(),
     }
+
+
+def _said(how: Any) -> dict[str, Any]:
+    said: dict[str, Any] = how.as_json() if isinstance(how, Way) else {"how": how}
+    return said
 
 
 def _show(problem: Problem, results: Sequence[PlanResult], answer: dict[str, Any]) -> None:
@@ -193,6 +265,10 @@ def _show(problem: Problem, results: Sequence[PlanResult], answer: dict[str, Any
     if best.plan is None:
         so_far = joined(best.best_prefix) or "nothing"
         print(f"The longest prefix that works: {so_far} ({len(best.best_prefix)} of {len(problem.actions)}).")
+    if best.why_not is not None:
+        for sentence in best.why_not.sentences:
+            print(f"  {sentence}")
+    elif best.plan is None:
         print(f"The last of {best.iterations} refusals:" if best.blame else "Nothing was refused.")
         for refusal in best.blame[-LAST_REFUSALS:]:
             print(f"  after {joined(refusal.after) or 'nothing'}, not {refusal.action}: {refusal.reason}")
@@ -227,6 +303,8 @@ def _show_steps(steps: Sequence[str], result: PlanResult) -> None:
 def _how(how: Any) -> str:
     if how is None:
         return ""
+    if isinstance(how, Way):
+        return f"  {how}"
     if isinstance(how, tuple | list) or hasattr(how, "tolist"):
         return f"  along {in_words(how)}" if len(how) == 3 else f"  {how}"
     return f"  {how}"

@@ -1,0 +1,239 @@
+"""Taking an assembly apart in groups: every action splits one block of parts into two, until all parts are single.
+
+A state is a partition of the parts into blocks. Each block has one anchor, a part that stays nameless in it: in the
+first block the fixed parts (together, for they never come apart), else one part that stays lowest. An action, named by
+a part that is no anchor, splits its block so that this part and the anchor are on different sides, and makes the part
+the anchor of its side. So each action can be used once, N loose parts take N splits beside fixed ones and N - 1
+without, and every split that there is has a name: of its two halves one is without the anchor.
+
+Without gravity no split is a mistake. Take any way to take the whole apart, and look at one block alone: what splits
+the whole splits the block, too, or leaves it as it is, since fewer parts hit fewer. So no block is worse for having
+been split off in another order, a planner need never go back, and where one block does not come apart, nothing does.
+
+Under gravity the block that stands on the ground, or around the fixed parts, must go on standing; what was taken out of
+it is in the hand, and is taken apart there without gravity and without ground. There the order matters, and a group
+that would leave something to fall is tried with the fallen ones added; other groups are not tried, so a refusal that
+rests on a fall proves nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from domains.assembly_splits import Block, Splitter
+from domains.assembly_why import explain_groups
+from neurosym.errors import InputError
+from neurosym.geometry.assembly import Assembly
+from neurosym.geometry.blocking import bits
+from neurosym.language import Action, Domain, Fluent, GroundProblem, Problem, Type
+from neurosym.planner import PlanResult, Status
+from neurosym.problem import Rejection, Step, Verdict
+from neurosym.validation import Validation
+from neurosym.ways import Way
+from neurosym.why_not import WhyNot, listed
+
+if TYPE_CHECKING:
+    from domains.assembly import Setting
+
+part = Type("part")
+apart = Fluent("apart", part)
+anchor = Fluent("anchor", part)
+_p = part("p")
+
+#: The symbols' bitset; the blocks of more than one part as bitsets, the one that stands first (0 where none does).
+State = tuple[int, tuple[int, ...]]
+
+
+def apart_in_groups(
+    assembly: Assembly,
+    setting: Setting,
+    *,
+    before: Iterable[tuple[str, str]],
+    name: str,
+    family: str,
+    details: Mapping[str, Any],
+) -> Problem:
+    """The problem in which an action, named by a part, splits that part's block."""
+    pairs = tuple(before)
+    anchors = assembly.fixed or (_lowest(assembly, setting, pairs),)
+    rules = GroupRules(assembly, setting, assembly.mask(anchors))
+    split = Action("split", _p, pre=[~apart(_p), ~anchor(_p)], eff=[apart(_p)], label="{p}")
+    return Domain("assembly-groups", fluents=[apart, anchor], actions=[split]).problem(
+        world=assembly,
+        objects={part: assembly.names},
+        init=[anchor(n) for n in anchors],
+        goal=[apart(n) for n in assembly.names if n not in anchors],
+        before=pairs,
+        name=name,
+        family=family,
+        details={**details, "anchor": list(anchors)},
+        rules=rules,
+        explain=rules.explain,
+    )
+
+
+def _lowest(assembly: Assembly, setting: Setting, before: Sequence[tuple[str, str]]) -> str:
+    """The first anchor where nothing is fixed: low under gravity, large, and not named in the precedence."""
+    named = {n for pair in before for n in pair}
+    free = [n for n in assembly.names if n not in named]
+    if not free:
+        raise InputError(
+            "Expected a part, in groups without a fixed one, that `before` does not name: it stays as the anchor. "
+            "Fix a part."
+        )
+    volumes = assembly.stability().masses / [p.density for p in assembly.parts]
+
+    def key(name: str) -> tuple[float, float, int]:
+        number = assembly.index[name]
+        low = assembly.body_bounds[assembly.owners == number, 0, 2].min() if setting.gravity else 0.0
+        return round(float(low / assembly.touch)), -round(float(volumes[number] / assembly.touch**3)), number
+
+    return min(free, key=key)
+
+
+class GroupRules:
+    """What a split changes (`neurosym.language.domain.Rules`): the search over partitions, and its replay."""
+
+    def __init__(self, assembly: Assembly, setting: Setting, anchors: int) -> None:
+        self.assembly, self.setting, self.anchors = assembly, setting, anchors
+        #: Whether one block stands: on a ground, around fixed parts, or under gravity.
+        self.standing = setting.gravity or assembly.has_table or bool(assembly.fixed)
+        self._search: GroupSearch | None = None
+
+    def search(self, symbols: GroundProblem) -> GroupSearch:
+        self._search = GroupSearch(self, symbols)
+        return self._search
+
+    def replay(self, problem: Problem, order: Sequence[str], how: Sequence[Any]) -> Validation:
+        """Replays an order on blocks that are plain sets; each split is asked of the pairs concerned, afresh."""
+        world = self.assembly.afresh()
+        splitter = Splitter(world, self.setting)
+        everything = frozenset(world.names)
+        grounded = everything if self.standing else frozenset[str]()
+        blocks = [everything]
+        anchors = set(world.in_mask(self.anchors))
+        if order and not (first := self.stands_at_first(world)).holds:
+            return Validation(False, 0, first.because, f"Step 0, {order[0]}: {first.reason}")
+        for step, name in enumerate(order):
+            if name in anchors:
+                said = "is an anchor" if name not in order[:step] else f"was done already, as step {order.index(name)}"
+                return Validation(False, step, (name,), f"{name} {said}.")
+            missing = [a for a, b in problem.before if b == name and a not in order[:step]]
+            if missing:
+                return Validation(False, step, (missing[0],), f"{name} may be done only after {missing[0]}.")
+            block = next(b for b in blocks if name in b)
+            asked = Block(world.mask(block), block == grounded)
+            kept = world.mask(anchors & block)
+            if how and isinstance(how[step], Way):
+                verdict = splitter.check(asked, world.index[name], kept, how[step])
+            else:
+                verdict = splitter.split(asked, world.index[name], kept)
+            if not verdict.holds:
+                return Validation(False, step, verdict.because, f"Step {step}, {name}: {verdict.reason}")
+            leaving = frozenset(verdict.how.parts)
+            blocks = [b for b in blocks if b != block] + [leaving, block - leaving]
+            if block == grounded:
+                grounded = block - leaving
+            anchors.add(name)
+        together = [b for b in blocks if len(b - set(world.fixed)) + bool(b & set(world.fixed)) > 1]
+        if together:
+            left = tuple(n for n in world.names if n in together[0])
+            said = f"After all {len(order)} actions the goal is missed: {listed(left)} are still together."
+            return Validation(False, len(order), left, said)
+        return Validation(True)
+
+    def stands_at_first(self, world: Assembly) -> Verdict:
+        """Whether the whole stands as it is, where it has to."""
+        if not self.setting.gravity:
+            return Verdict(True)
+        answer = world.stability().standing_when_held((1 << len(world)) - 1, self.setting.held)
+        falling = world.in_mask(answer.moving)
+        said = f"The assembly does not stand as it is: {listed(falling)} would fall."
+        return Verdict(answer.stands, () if answer.stands else falling, "" if answer.stands else said)
+
+    def explain(self, result: PlanResult) -> WhyNot | None:
+        """Why the blocks that are left after the longest prefix do not come apart."""
+        if result.status is Status.OUT_OF_BUDGET or self._search is None:
+            return None
+        search, state = self._search, self._search.initial
+        for name in result.best_prefix:
+            answer = search.attempt(state, search.actions.index(name))
+            assert isinstance(answer, Step)
+            state = answer.state
+        refused = {a: search.attempt(state, a) for a in search.candidates(state)}
+        stuck = {search.actions[a]: r for a, r in refused.items() if isinstance(r, Rejection)}
+        return explain_groups(self.assembly, self.setting, result.best_prefix, search.blocks(state), stuck)
+
+
+class GroupSearch:
+    """The `SearchProblem` over partitions."""
+
+    def __init__(self, rules: GroupRules, symbols: GroundProblem) -> None:
+        self.rules, self.symbols = rules, symbols
+        self.assembly = rules.assembly
+        self.splitter = Splitter(rules.assembly, rules.setting)
+        self.actions = symbols.actions
+        self.classes = symbols.classes
+        whole = (1 << len(rules.assembly)) - 1
+        self.initial: State = (symbols.initial, (whole,) if rules.standing else (0, whole))
+        self._numbers = [rules.assembly.index[name] for name in self.actions]
+        self._action_of = {number: action for action, number in enumerate(self._numbers)}
+        self._verdicts: dict[tuple[int, bool, int], Verdict] = {}
+        self._at_first: Verdict | None = None
+
+    def is_goal(self, state: State) -> bool:
+        return self.symbols.is_goal(state[0])
+
+    def candidates(self, state: State) -> list[int]:
+        return self.symbols.candidates(state[0])
+
+    def attempt(self, state: State, action: int) -> Step[State] | Rejection:
+        symbols, blocks = state
+        if action not in self.candidates(state):
+            answer = self.symbols.attempt(symbols, action)
+            assert isinstance(answer, Rejection)
+            return answer
+        if state == self.initial:
+            self._at_first = self._at_first or self.rules.stands_at_first(self.assembly)
+            if not self._at_first.holds:
+                return Rejection(self._at_first.reason, self._at_first.because, (action,))
+        number = self._numbers[action]
+        place = next(i for i, block in enumerate(blocks) if block >> number & 1)
+        block = Block(blocks[place], place == 0)
+        anchors = self.rules.anchors | self._used(symbols)
+        verdict = self._split(block, number, anchors & block.parts)
+        if not verdict.holds:
+            # The answer depends on the block alone, and the block stays as it is until one of its parts is split off.
+            others = [self._action_of[n] for n in bits(block.parts & ~anchors) if self._action_of[n] != action]
+            until = tuple(others) or (action,)
+            return Rejection(verdict.reason, verdict.because, until, proved=verdict.proved)
+        leaving = self.assembly.mask(verdict.how.parts)
+        return Step((self.symbols.apply(symbols, action), self._after(blocks, place, leaving)), verdict.how)
+
+    def blocks(self, state: State) -> list[Block]:
+        """The blocks of more than one part, the fixed ones counted as one."""
+        fixed = self.assembly.fixed_mask
+        found = [Block(parts, i == 0) for i, parts in enumerate(state[1])]
+        return [b for b in found if (b.parts & ~fixed).bit_count() + bool(b.parts & fixed) > 1]
+
+    def _split(self, block: Block, number: int, anchor: int) -> Verdict:
+        key = (block.parts, block.stands, number)
+        if key not in self._verdicts:
+            self._verdicts[key] = self.splitter.split(block, number, anchor)
+        return self._verdicts[key]
+
+    def _used(self, symbols: int) -> int:
+        start, _ = self.symbols.runs[apart]
+        return (symbols >> start) & ((1 << len(self.assembly)) - 1)
+
+    @staticmethod
+    def _after(blocks: tuple[int, ...], place: int, leaving: int) -> tuple[int, ...]:
+        stands, hand = blocks[0], list(blocks[1:])
+        if place == 0:
+            stands &= ~leaving
+            hand.append(leaving)
+        else:
+            rest = hand.pop(place - 1) & ~leaving
+            hand += [leaving, rest]
+        return (stands, *sorted(b for b in hand if b & (b - 1)))

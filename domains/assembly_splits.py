@@ -1,0 +1,236 @@
+"""One split: how a block of parts falls into two, the part that is asked for on the one side, its anchor on the other.
+
+Of the two halves one leaves, along a straight line or a path. A block either stands (on the ground, around the fixed
+parts), and then what stays of it must stand, too; or it is in the hand, without gravity.
+
+Along one direction, what leaves is closed under "hits": the smallest group that holds a part is the closure of that
+part. Either the asked part's closure leaves the anchor, or the anchor's half leaves the asked part, whose smallest
+half then is its closure under "is hit by". So if a block comes apart at all along one of the directions, with some part
+and its anchor on different sides, that part's closure says so.
+"""
+
+from __future__ import annotations
+
+import heapq
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from domains.assembly_paths import grid_of, ground_of, separation, way_out
+from neurosym.geometry.assembly import Assembly
+from neurosym.geometry.blocking import bits
+from neurosym.geometry.sweep import exits_along
+from neurosym.predicates import stands
+from neurosym.problem import Verdict
+from neurosym.ways import Way
+from neurosym.why_not import listed
+
+if TYPE_CHECKING:
+    from domains.assembly import Setting
+
+
+@dataclass(frozen=True)
+class Block:
+    """Parts that hang together: a bitset, and whether they stand or are in the hand."""
+
+    parts: int
+    stands: bool
+
+
+@dataclass(frozen=True)
+class Half:
+    """A half of a block that may leave (a bitset), and along which direction, by number."""
+
+    leaving: int
+    direction: int
+
+
+class Splitter:
+    """Answers how a part is split from its anchor. An assembly made by `afresh` is asked pair by pair, without tables.
+
+    Args:
+        assembly: with its fixed parts and its ground.
+        setting: the options of the problem.
+    """
+
+    def __init__(self, assembly: Assembly, setting: Setting) -> None:
+        self.assembly, self.setting = assembly, setting
+        self.graph = assembly.blocking(setting.directions)
+        self._hit_by: dict[int, list[int]] = {}
+
+    def split(self, block: Block, part: int, anchor: int) -> Verdict:
+        """The smallest half with `part`, without the parts in `anchor` (a bitset), that comes off.
+
+        Returns:
+            A verdict: `how` is the `Way` of the half that leaves; where there is none, what `because` names keeps the
+            two together, or would fall.
+        """
+        # The fallen that a half takes along make it larger: the smallest is always looked at first.
+        queue: list[tuple[int, int, int, Half]] = []
+        for d in range(len(self.graph.vectors)):
+            for kind, leaving in enumerate(self._halves(block, part, anchor, d)):
+                if leaving:
+                    self._push(queue, Half(leaving, d), kind, block, part)
+        refused: Verdict | None = None
+        while queue:
+            _, _, kind, half = heapq.heappop(queue)
+            standing = self._standing(block, half.leaving)
+            if standing.holds:
+                held = standing.how.held if standing.how else ()
+                names = self.assembly.in_mask(half.leaving)
+                return Verdict(True, how=Way.along(names, self.graph.vectors[half.direction]).joined(Way(held=held)))
+            refused = refused or standing
+            taken = half.leaving | self.assembly.mask(standing.because)
+            grown = self._closure(taken, half.direction, block.parts)
+            stays = anchor if half.leaving >> part & 1 else 1 << part
+            if not grown & stays:
+                self._push(queue, Half(grown, half.direction), kind, block, part)
+        if self.setting.paths == "any":
+            found = self._by_path(block, part, anchor)
+            if found.holds or refused is None:
+                return found
+        if refused is not None:
+            # Another group than those looked at might leave the rest standing: nothing is proved.
+            return Verdict(False, refused.because, refused.reason, proved=False)
+        return self._interlocked(block, part, anchor)
+
+    def check(self, block: Block, part: int, anchor: int, way: Way) -> Verdict:
+        """Whether a half may leave in a given way, asked of the pairs concerned alone."""
+        leaving = self.assembly.mask(way.parts)
+        rest = block.parts & ~leaving
+        said = ", ".join(way.parts)
+        apart = bool(leaving >> part & 1) != bool(leaving & anchor) and (anchor & rest) in (0, anchor)
+        if leaving & ~block.parts or not apart:
+            return Verdict(False, way.parts, f"{said}: this does not split {self.assembly.names[part]} from its block.")
+        if block.stands and leaving & self.assembly.fixed_mask:
+            return Verdict(False, way.parts, f"{said}: one of these is fixed.")
+        if way.path is not None:
+            if set(way.path.leaving) != set(way.parts) or self.setting.paths != "any":
+                return Verdict(False, way.parts, f"{said}: the path is not one of theirs.")
+            ground = ground_of(self.assembly) if block.stands else None
+            clear = way.path.check(self.assembly, block.parts, ground=ground)
+            if not clear.holds:
+                return Verdict(False, clear.parts, clear.reason)
+        else:
+            d = self._number(way)
+            if d < 0 or (block.stands and self.graph.into_table[d]):
+                return Verdict(False, (), f"{said} cannot go {way}: that is none of the problem's ways out.")
+            for mine in bits(leaving):
+                hit = self.assembly.in_mask(self._hits(mine, d, rest))
+                if hit:
+                    return Verdict(False, hit, f"{said} cannot go {way}: {listed(hit)} would be hit.")
+        if block.stands and self.setting.gravity:
+            if len(way.held) > self.setting.held or self.assembly.mask(way.held) & ~rest:
+                return Verdict(False, way.held, f"{', '.join(way.held)} cannot all be held.")
+            answer = self.assembly.stability().standing(rest, held=self.assembly.mask(way.held))
+            if not answer.stands:
+                falling = self.assembly.in_mask(answer.moving)
+                return Verdict(False, falling, f"Without {said}, {listed(falling)} would fall.")
+        return Verdict(True, how=way)
+
+    # -- straight lines ---------------------------------------------------------------------------------------
+
+    def _halves(self, block: Block, part: int, anchor: int, d: int) -> tuple[int, int]:
+        """What leaves along a direction: the asked part with what it hits, or all but what it is hit by; 0: neither."""
+        if block.stands and self.graph.into_table[d]:
+            return 0, 0
+        with_part = self._closure(1 << part, d, block.parts)
+        if with_part & anchor:
+            with_part = 0
+        if block.stands and anchor & self.assembly.fixed_mask:
+            return with_part, 0
+        staying = self._closure(1 << part, d, block.parts, backwards=True)
+        return with_part, 0 if staying & anchor else block.parts & ~staying
+
+    def _closure(self, group: int, d: int, among: int, *, backwards: bool = False) -> int:
+        """All in `among` that a group hits along a direction, that these hit in turn, ...; backwards: by whom."""
+        closed, waiting = 0, group & among
+        while waiting:
+            closed |= waiting
+            found = 0
+            if not backwards:
+                for one in bits(waiting):
+                    found |= self._hits(one, d, among & ~closed)
+            elif self.assembly.keeps_answers:
+                for one in bits(waiting):
+                    found |= self._hitters(d)[one] & among
+            else:
+                for other in bits(among & ~closed):
+                    if self._hits(other, d, waiting):
+                        found |= 1 << other
+            waiting = found & ~closed
+        return closed
+
+    def _hitters(self, d: int) -> list[int]:
+        """For each part a bitset of those that hit it along a direction."""
+        if d not in self._hit_by:
+            hit_by = [0] * len(self.assembly)
+            for part, blockers in enumerate(self.graph.by_part[d]):
+                for other in bits(blockers):
+                    hit_by[other] |= 1 << part
+            self._hit_by[d] = hit_by
+        return self._hit_by[d]
+
+    def _hits(self, part: int, d: int, others: int) -> int:
+        """Those of `others` that a part hits along a direction."""
+        if self.assembly.keeps_answers:
+            return self.graph.blockers(part, d, others)
+        found = exits_along(self.assembly, part, self.graph.directions[d], bits(others & ~(1 << part)))
+        return sum(1 << o for o in found)
+
+    def _push(self, queue: list[tuple[int, int, int, Half]], half: Half, kind: int, block: Block, part: int) -> None:
+        side = half.leaving if half.leaving >> part & 1 else block.parts & ~half.leaving
+        heapq.heappush(queue, (side.bit_count(), kind * len(self.graph.vectors) + half.direction, kind, half))
+
+    def _standing(self, block: Block, leaving: int) -> Verdict:
+        if not (block.stands and self.setting.gravity):
+            return Verdict(True)
+        names = self.assembly.in_mask(leaving)
+        return stands(self.assembly, block.parts & ~leaving, names, held=self.setting.held)
+
+    def _number(self, way: Way) -> int:
+        for d, vector in enumerate(self.graph.vectors):
+            if way.direction is not None and max(abs(a - b) for a, b in zip(vector, way.direction)) < 1e-9:
+                return d
+        return -1
+
+    def _interlocked(self, block: Block, part: int, anchor: int) -> Verdict:
+        name, kept = self.assembly.names[part], self.assembly.in_mask(anchor)
+        because = 0
+        said = []
+        for d in range(len(self.graph.vectors)):
+            if block.stands and self.graph.into_table[d]:
+                said.append(f"{self.graph.describe(d)}: into the table")
+                continue
+            hit = self._hits(part, d, block.parts)
+            because |= hit
+            closed = self.assembly.in_mask(self._closure(1 << part, d, block.parts))
+            said.append(f"{self.graph.describe(d)}: it moves {listed(closed)}")
+        reason = f"{name} cannot be separated from {listed(kept)} along any direction ({'; '.join(said)})."
+        return Verdict(False, self.assembly.in_mask(because), reason)
+
+    # -- paths ------------------------------------------------------------------------------------------------
+
+    def _by_path(self, block: Block, part: int, anchor: int) -> Verdict:
+        """Off by a path: of cells, the first separation of the block by moves of groups; else the part by itself."""
+        name = self.assembly.names[part]
+        if not (block.stands and self.setting.gravity) and grid_of(self.assembly) is not None:
+            found = separation(self.assembly, block.parts, standing=block.stands)
+            if isinstance(found, bool):
+                reason = f"No moves of groups separate {listed(self.assembly.in_mask(block.parts))}."
+                return Verdict(False, self.assembly.in_mask(block.parts & ~(1 << part)), reason, proved=found)
+            path, leaving = found
+            if bool(leaving >> part & 1) == bool(leaving & anchor):
+                split = self.assembly.in_mask(leaving)
+                reason = f"{name} stays with its anchor: {listed(split)} can be separated first."
+                return Verdict(False, split, reason)
+            return Verdict(True, how=Way(path.leaving, path=path))
+        out = way_out(self.assembly, 1 << part, block.parts)
+        if isinstance(out, tuple):
+            reason, met, _ = out
+            # The part may come off together with others, which this search does not try.
+            return Verdict(False, met, reason, proved=False)
+        standing = self._standing(block, 1 << part)
+        if not standing.holds:
+            return Verdict(False, standing.because, standing.reason, proved=False)
+        held = standing.how.held if standing.how else ()
+        return Verdict(True, how=Way((name,), path=out, held=held))

@@ -1,0 +1,115 @@
+"""Why an assembly does not come apart: looked up in the geometry where a search got stuck."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from neurosym.geometry.assembly import Assembly
+from neurosym.geometry.blocking import bits
+from neurosym.planner import PlanResult, Status
+from neurosym.predicates import losses
+from neurosym.problem import Rejection
+from neurosym.why_not import Blocked, Cycle, Fall, WhyNot, blockers_of, smallest_cycle
+
+if TYPE_CHECKING:
+    from domains.assembly import Setting
+    from domains.assembly_splits import Block
+
+
+def explain_removal(
+    assembly: Assembly, setting: Setting, before: Sequence[tuple[str, str]], result: PlanResult
+) -> WhyNot | None:
+    """Why nothing more can be removed after the longest prefix that works; None where a budget ended the search."""
+    if result.status is Status.OUT_OF_BUDGET:
+        return None
+    done = result.best_prefix
+    there = (1 << len(assembly)) - 1 & ~assembly.mask(done)
+    graph = assembly.blocking(setting.directions)
+    blocked: list[Blocked] = []
+    falls: list[Fall] = []
+    waiting: list[tuple[str, str]] = []
+    for part in bits(there & ~assembly.fixed_mask):
+        if not graph.free_directions(part, there):
+            blocked += blockers_of(graph, part, there, table=True)
+            continue
+        name = assembly.names[part]
+        waiting += [(name, first) for first, then in before if then == name and first not in done]
+        if setting.gravity:
+            answer = assembly.stability().standing_when_held(there & ~(1 << part), setting.held)
+            if not answer.stands:
+                falls.append(fall(assembly, 1 << part, answer.moving, setting.held))
+    kept = assembly.mask(b.part for b in blocked)
+    return WhyNot(
+        after=done,
+        left=assembly.in_mask(there),
+        blocked=tuple(blocked),
+        cycle=smallest_cycle(graph, kept),
+        falls=tuple(falls),
+        waiting=tuple(waiting),
+    )
+
+
+def fall(assembly: Assembly, leaving: int, moving: int, held: int) -> Fall:
+    """What falls (a bitset) when the parts in `leaving` go."""
+    lost = losses(assembly, moving, leaving)
+    return Fall(assembly.in_mask(leaving), assembly.in_mask(moving), lost, held)
+
+
+def explain_groups(
+    assembly: Assembly,
+    setting: Setting,
+    done: tuple[str, ...],
+    blocks: Sequence[Block],
+    refused: Mapping[str, Rejection],
+) -> WhyNot:
+    """Why the blocks that are left do not come apart in groups.
+
+    Args:
+        done: names of the actions that were done.
+        blocks: of more than one part.
+        refused: part that is no anchor -> why it cannot be split off.
+    """
+    graph = assembly.blocking(setting.directions)
+    blocked: list[Blocked] = []
+    falls: list[Fall] = []
+    cycles: list[Cycle] = []
+    unproved: list[str] = []
+    left = 0
+    for block in blocks:
+        names = [n for n in assembly.in_mask(block.parts) if n in refused]
+        if not names:
+            continue
+        left |= block.parts
+        for name in names:
+            blocked += blockers_of(graph, assembly.index[name], block.parts, table=block.stands)
+            if not refused[name].proved:
+                unproved.append(name)
+        cycle = smallest_cycle(graph, block.parts)
+        if cycle is not None:
+            cycles.append(cycle)
+        if block.stands and setting.gravity:
+            falls += _falls_of_groups(assembly, setting, block, names)
+    return WhyNot(
+        after=done,
+        left=assembly.in_mask(left),
+        blocked=tuple(blocked),
+        cycle=min(cycles, key=lambda c: len(c.parts), default=None),
+        falls=tuple(falls),
+        unproved=tuple(unproved),
+    )
+
+
+def _falls_of_groups(assembly: Assembly, setting: Setting, block: Block, names: Sequence[str]) -> list[Fall]:
+    """For each part the smallest group that could leave with it, and what would fall then."""
+    graph = assembly.blocking(setting.directions)
+    found: dict[int, Fall] = {}
+    for name in names:
+        number = assembly.index[name]
+        groups = [graph.leaving_group(number, d, block.parts) for d in range(len(graph.vectors))]
+        leaving = min((g for g in groups if g and g != block.parts), key=int.bit_count, default=0)
+        if leaving and leaving not in found:
+            answer = assembly.stability().standing_when_held(block.parts & ~leaving, setting.held)
+            if not answer.stands:
+                found[leaving] = fall(assembly, leaving, answer.moving, setting.held)
+    return list(found.values())
