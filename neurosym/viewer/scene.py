@@ -74,6 +74,7 @@ class PlanScene:
     def _add(self, timeline: Timeline) -> None:
         assembly, scene = timeline.staging.assembly, self.server.scene
         low, high = assembly.bounds
+        self._sent = np.full((len(assembly), 8), np.nan)
         self.scale = SIZE / float((high - low).max())
         self.origin = np.array([*(low[:2] + high[:2]) / 2, floor_of(assembly)])
         thick = 0.0035 * SIZE
@@ -167,11 +168,19 @@ class PlanScene:
         if timeline is None:
             return
         positions, turns = timeline.frames(t)
-        places, seen = self._to_scene(positions), timeline.visible(t)
+        seen = timeline.visible(t)
+        now = np.concatenate([self._to_scene(positions), turns, seen[:, None]], axis=1)
+        # A step moves a few parts of hundreds, and turns fewer.
+        new = now != self._sent
         with self.server.atomic():
-            for node, place, turn, visible in zip(self.parts, places, turns, seen):
-                node.position, node.wxyz, node.visible = place, turn, bool(visible)
+            for i in np.flatnonzero(new[:, :3].any(axis=1)):
+                self.parts[i].position = now[i, :3]
+            for i in np.flatnonzero(new[:, 3:7].any(axis=1)):
+                self.parts[i].wxyz = now[i, 3:7]
+            for i in np.flatnonzero(new[:, 7]):
+                self.parts[i].visible = bool(seen[i])
             self._show_way(timeline, t)
+        self._sent = now
 
     def _show_way(self, timeline: Timeline, t: float) -> None:
         """The way of the step under way as a line; the parts' middle follows it."""
