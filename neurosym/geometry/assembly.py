@@ -155,11 +155,39 @@ class Assembly:
         fixed: Iterable[str] = (),
         tolerances: Tolerances | None = None,
         friction: float | None = None,
+        up: str | None = None,
+        problem: int = 1,
+        solution: int = 1,
     ) -> Assembly:
-        """An assembly from a folder of meshes or from a file."""
-        from neurosym.geometry.loading import load
+        """An assembly from a folder of meshes or from a file, looked over.
 
-        return load(path, units=units, fixed=fixed, tolerances=tolerances, friction=friction)
+        Args:
+            path: a folder with one mesh a part (OBJ, STL, PLY, OFF; see `neurosym.geometry.formats.folder`), or a file:
+                GLB, glTF, 3MF, STEP (extra ``cad``), BurrTools ``.xmpuzzle``, the JSON that `save` writes (see
+                `neurosym.geometry.formats.assembly_json`), or one mesh. Parts are named after files or nodes.
+            units: the unit of the assembly's lengths ("mm", "m", "in", ...). Of a format that states its own (glTF and
+                STEP metres, 3MF and JSON what they say) lengths are converted to it; of others it says what they are.
+            fixed: names of parts that never move, besides those that the files name.
+            tolerances: kept as they are where given. Otherwise touch is raised, to at most 5% of the smallest extent,
+                so that mating faces that overlap a little at rest count as touching; `notes` says by how much.
+            friction: Coulomb's coefficient; None: the file's, else 0.5.
+            up: "y" or "z", what is up in a glTF file; None: see `neurosym.geometry.formats.gltf`.
+            problem, solution: which of a puzzle file's, counted from 1.
+
+        Returns:
+            The assembly; `notes` says what was found and mended.
+
+        Raises:
+            FaultyPartsError: parts that cannot be used (open, crossing themselves, not numbers, overlapping deeply);
+                all of them, each with the measure and what to do.
+            AssemblyError: the file cannot be read, goes beyond a limit, or reaches outside its folder.
+            InputError: an unknown unit, part or number of a problem.
+            MissingDependencyError: STEP without cascadio.
+        """
+        from neurosym.geometry.loading import Options, load
+
+        options = Options(up=up, problem=problem, solution=solution)
+        return load(path, units=units, fixed=fixed, tolerances=tolerances, friction=friction, options=options)
 
     def save(self, path: str | Path) -> None:
         """Write the assembly as JSON, whole or not at all; `load` gives the same one back, number by number."""

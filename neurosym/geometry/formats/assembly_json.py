@@ -14,8 +14,8 @@ a path relative to the file, inside its folder. `bodies` is what `write` uses: s
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +25,15 @@ from numpy.typing import NDArray
 from neurosym.errors import AssemblyError
 from neurosym.files import write_text
 from neurosym.geometry.assembly import Assembly
-from neurosym.geometry.formats.contents import MAX_PARTS, MAX_TEXT_BYTES, gunzip, read_bytes
+from neurosym.geometry.formats.contents import (
+    MAX_TEXT_BYTES,
+    Contents,
+    RawMesh,
+    gunzip,
+    inside,
+    read_bytes,
+    within_limits,
+)
 from neurosym.geometry.shapes import Body, Box, Convex, Mesh, Part, Shape, boxes_part
 from neurosym.geometry.tolerances import DEFAULT_TOLERANCES, Tolerances
 
@@ -38,28 +46,6 @@ SCHEMA = 1
 
 _TOP = {"format", "schema", "units", "friction", "table", "tolerances", "fixed", "parts"}
 _PART = {"name", "density", "pose", "cells", "cell", "boxes", "mesh", "bodies"}
-
-
-@dataclass(frozen=True)
-class Document:
-    """A file's contents. ``parts``: ready, or (name, path of a mesh, pose, density) where one is still to be read."""
-
-    parts: tuple[Part | MeshPart, ...]
-    units: str | None
-    friction: float
-    table: float | None
-    tolerances: Tolerances | None
-    fixed: tuple[str, ...]
-
-
-@dataclass(frozen=True, eq=False)
-class MeshPart:
-    """A part whose mesh lies in a file beside. ``mesh``: as written; ``X_WP``: float64 (4, 4)."""
-
-    name: str
-    mesh: str
-    X_WP: Array
-    density: float
 
 
 def write(assembly: Assembly, path: str | Path) -> None:
@@ -93,8 +79,11 @@ def _shape(shape: Shape) -> dict[str, Any]:
     return {kind: {"vertices": np.asarray(shape.vertices).tolist(), "faces": np.asarray(shape.faces).tolist()}}
 
 
-def read(path: Path) -> Document:
-    """Read a file; its meshes are left to the caller.
+def read_json(path: Path, read_mesh: Callable[[Path], RawMesh]) -> Contents:
+    """The assembly in a file.
+
+    Args:
+        read_mesh: reads a mesh that a part names by its path.
 
     Raises:
         AssemblyError: it is no such JSON; the message names the place.
@@ -107,7 +96,7 @@ def read(path: Path) -> Document:
             raise
         raise AssemblyError(f"Expected an assembly as JSON in {path}; got: {error}.") from None
     try:
-        return _document(given)
+        return _contents(given, lambda mesh: read_mesh(inside(path.parent, mesh)), path)
     except _Odd as odd:
         raise AssemblyError(f"Expected an assembly as JSON in {path}; {odd}.") from None
 
@@ -116,23 +105,24 @@ class _Odd(Exception):
     """What is wrong, and where."""
 
 
-def _document(given: Any) -> Document:
+def _contents(given: Any, read_mesh: Callable[[str], RawMesh], path: Path) -> Contents:
     top = _mapping("the file", given, _TOP)
     if top.get("format") != FORMAT:
         raise _Odd(f'its "format" is {_brief(top.get("format"))}, expected "{FORMAT}"')
     if top.get("schema") != SCHEMA:
         raise _Odd(f'its "schema" is {_brief(top.get("schema"))}, this version reads {SCHEMA}')
     parts = _list("parts", top.get("parts"))
-    if not 1 <= len(parts) <= MAX_PARTS:
-        raise _Odd(f"it has {len(parts)} parts, expected 1 to {MAX_PARTS:,}")
-    table, tolerances, units = top.get("table"), top.get("tolerances"), top.get("units")
-    return Document(
-        tuple(_part(f"parts[{i}]", part) for i, part in enumerate(parts)),
+    if not parts:
+        raise _Odd("it has no parts")
+    within_limits(path, 0, parts=len(parts))
+    table, tolerances, units, friction = (top.get(k) for k in ("table", "tolerances", "units", "friction"))
+    return Contents(
+        tuple(_part(f"parts[{i}]", part, read_mesh) for i, part in enumerate(parts)),
         None if units is None else _text("units", units),
-        _number("friction", top.get("friction", 0.5), low=0.0),
-        None if table is None else _number("table", table),
-        None if tolerances is None else _tolerances(tolerances),
         tuple(_text(f"fixed[{i}]", name) for i, name in enumerate(_list("fixed", top.get("fixed", [])))),
+        None if table is None else _number("table", table),
+        None if friction is None else _number("friction", friction, low=0.0),
+        None if tolerances is None else _tolerances(tolerances),
     )
 
 
@@ -142,7 +132,7 @@ def _tolerances(given: Any) -> Tolerances:
     return Tolerances(**{k: _number(f"tolerances.{k}", v, low=0.0) for k, v in {**known, **values}.items()})
 
 
-def _part(at: str, given: Any) -> Part | MeshPart:
+def _part(at: str, given: Any, read_mesh: Callable[[str], RawMesh]) -> Part | RawMesh:
     part = _mapping(at, given, _PART)
     name = _text(f"{at}.name", part.get("name"))
     if not name:
@@ -155,7 +145,8 @@ def _part(at: str, given: Any) -> Part | MeshPart:
         raise _Odd(f"{at} has {' and '.join(made_of) or 'none'} of cells, boxes, mesh and bodies, expected one")
     kind = made_of[0]
     if kind == "mesh":
-        return MeshPart(name, _text(f"{at}.mesh", part["mesh"]), pose, density)
+        mesh = read_mesh(_text(f"{at}.mesh", part["mesh"]))
+        return replace(mesh, name=name, X_WP=pose if "pose" in part else None, density=density)
     things = _list(f"{at}.{kind}", part[kind])
     if not things:
         raise _Odd(f"{at}.{kind} is empty")

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from neurosym.errors import AssemblyError
-from neurosym.geometry.formats.contents import MAX_FACES, Contents, RawMesh, read_bytes
+from neurosym.geometry.formats.contents import Contents, RawMesh, read_bytes, within_limits
 from neurosym.geometry.formats.polygons import triangulate
 
 
@@ -42,8 +42,7 @@ def read_obj(path: Path, *, split: bool = False) -> Contents:
                 objects.append((line.split("#", 1)[0].strip()[1:].strip(), []))
         except (ValueError, OverflowError) as error:
             raise AssemblyError(f"Expected OBJ in {path}; line {number} is {line[:60]!r}: {error}.") from None
-        if count > MAX_FACES:
-            raise AssemblyError(f"Expected at most {MAX_FACES:,} triangles in {path}; got more. Simplify the mesh.")
+        within_limits(path, count if not split else 0, count, len(objects) - 1)
     points = np.array(vertices, dtype=np.float64).reshape(-1, 3)
     meshes = []
     for name, polygons in objects:

@@ -1,0 +1,155 @@
+"""Triangle meshes as graphs: merged vertices, open edges, shells, windings. All of it whole arrays at a time."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+Array = NDArray[np.float64]
+Faces = NDArray[np.int64]
+
+#: Open edges beyond this number are a hole, not a row of T-junctions: nobody is asked to match them up.
+MAX_OPEN_EDGES = 5_000
+
+
+def merged(vertices: Array, faces: Faces, within: float = 0.0) -> tuple[Array, Faces]:
+    """Vertices in one place made one, unused ones dropped; `within` a length: chains of nearer ones, too."""
+    used, inverse = np.unique(faces, return_inverse=True)
+    # Adding 0 turns -0 into 0.
+    vertices, faces = vertices[used] + 0.0, inverse.reshape(-1, 3)
+    groups, first = _alike(vertices)
+    vertices, faces = vertices[first], groups[faces]
+    if within > 0:
+        pairs = cKDTree(vertices).query_pairs(within, output_type="ndarray")
+        if len(pairs):
+            labels = _components(pairs, len(vertices))
+            _, first = np.unique(labels, return_index=True)
+            vertices, faces = vertices[first], labels[faces]
+    return vertices, faces
+
+
+def without_repeats(faces: Faces) -> Faces:
+    """The faces that have three corners, each once; a face and its mirror image, back to back, cancel."""
+    a, b, c = faces.T
+    faces = faces[(a != b) & (b != c) & (c != a)]
+    if not len(faces):
+        return faces
+    # From the least corner on, so that one face has one form; the sign says which way round it goes.
+    start = np.argmin(faces, axis=1)
+    one, two, three = (faces[np.arange(len(faces)), (start + k) % 3] for k in range(3))
+    group, first = _alike(np.stack([one, np.minimum(two, three), np.maximum(two, three)], axis=1))
+    ways = np.zeros((len(first), 2), dtype=bool)
+    ways[group, (two < three).astype(int)] = True
+    kept = np.zeros(len(faces), dtype=bool)
+    kept[first] = ~ways.all(axis=1)
+    return faces[kept]
+
+
+def _alike(rows: NDArray[np.float64] | NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Equal rows as groups: the group of each row, and the first row of each group."""
+    order = np.lexsort(rows.T[::-1])
+    new = np.ones(len(order), dtype=bool)
+    new[1:] = (rows[order[1:]] != rows[order[:-1]]).any(axis=1)
+    group = np.empty(len(order), dtype=np.int64)
+    group[order] = np.cumsum(new) - 1
+    return group, order[new]
+
+
+def _components(pairs: NDArray[np.int64], count: int) -> NDArray[np.int64]:
+    graph = coo_matrix((np.ones(len(pairs), dtype=np.int8), (pairs[:, 0], pairs[:, 1])), (count, count))
+    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
+
+
+def half_edges(faces: Faces) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The half edges of faces (m, 3): start and end, int64 (3 m, 2), and the number of the edge of each, (3 m,).
+
+    Half edge h belongs to face h % m.
+    """
+    half = np.stack([faces.T.ravel(), faces[:, [1, 2, 0]].T.ravel()], axis=1)
+    low, high = half.min(axis=1), half.max(axis=1)
+    return half, np.unique(low * (int(faces.max()) + 1) + high, return_inverse=True)[1].astype(np.int64)
+
+
+def _upward(half: NDArray[np.int64]) -> Array:
+    """+1 for a half edge that runs to the higher number, -1 for one that comes back."""
+    return np.where(half[:, 0] < half[:, 1], 1.0, -1.0)
+
+
+def open_edges(faces: Faces) -> tuple[NDArray[np.int64], bool]:
+    """Half edges (k, 2) that no face comes back along; and whether turning faces might close them all."""
+    half, edge = half_edges(faces)
+    balance = np.bincount(edge, weights=_upward(half))
+    # Of an edge that is gone along more often one way, the halves of that way are open.
+    odd = _upward(half) == np.sign(balance[edge])
+    return half[odd], bool(odd.any() and (np.bincount(edge) % 2 == 0).all())
+
+
+def neighbours(faces: Faces) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Faces that share an edge with each other and no third, int64 (k, 2), and whether both go along it alike."""
+    half, edge = half_edges(faces)
+    order = np.argsort(edge, kind="stable")
+    pairs = order[np.bincount(edge)[edge[order]] == 2].reshape(-1, 2)
+    return pairs % len(faces), half[pairs[:, 0], 0] == half[pairs[:, 1], 0]
+
+
+def same_winding(faces: Faces) -> Faces | None:
+    """The faces turned so that neighbours agree, or None where no way of turning does (a Moebius strip).
+
+    Each face is two nodes, as it is and turned; neighbours join the nodes that agree. Where a face falls into one
+    component with its own opposite, the surface has but one side.
+    """
+    pairs, alike = neighbours(faces)
+    m = len(faces)
+    one, two = pairs.T
+    here = np.stack([one, two + m * alike], axis=1)
+    there = np.stack([one + m, two + m * ~alike], axis=1)
+    labels = _components(np.concatenate([here, there]), 2 * m)
+    if (labels[:m] == labels[m:]).any():
+        return None
+    turned = labels[:m] > labels[m:]
+    return np.where(turned[:, None], faces[:, ::-1], faces)
+
+
+def shells_of(faces: Faces) -> NDArray[np.int64]:
+    """int64 (m,): the number of the shell that each face belongs to; shells that meet in an edge are two."""
+    return _components(neighbours(faces)[0], len(faces))
+
+
+def closes_at_junctions(vertices: Array, faces: Faces, within: float) -> bool:
+    """Whether the open edges close once each is cut at the open corners that lie on it, nearer than `within`."""
+    half, _ = open_edges(faces)
+    if not 0 < len(half) <= MAX_OPEN_EDGES:
+        return False
+    corners = np.unique(half)
+    tree = cKDTree(vertices[corners])
+    pieces = []
+    for start, end in half:
+        a, along = vertices[start], vertices[end] - vertices[start]
+        length = float(np.linalg.norm(along))
+        near = corners[tree.query_ball_point(a + along / 2, length / 2 + within)]
+        share = (vertices[near] - a) @ along / max(length**2, 1e-300)
+        off = np.linalg.norm(vertices[near] - a - share[:, None] * along, axis=1)
+        on = (off <= within) & (share * length > within) & ((1 - share) * length > within)
+        chain = [start, *near[on][np.argsort(share[on])], end]
+        pieces += list(pairwise(chain))
+    cut = np.array(pieces, dtype=np.int64)
+    edge = np.unique(cut.min(axis=1) * len(vertices) + cut.max(axis=1), return_inverse=True)[1]
+    return not np.bincount(edge, weights=_upward(cut)).any()
+
+
+def area_vectors(vertices: Array, faces: Faces) -> Array:
+    """float64 (m, 3): outward normals, as long as the faces are large."""
+    t = vertices[faces]
+    vectors: Array = np.cross(t[:, 1] - t[:, 0], t[:, 2] - t[:, 0]) / 2
+    return vectors
+
+
+def shell_volumes(vertices: Array, faces: Faces, shells: NDArray[np.int64]) -> Array:
+    """Signed volume of each shell, float64 (k,), positive where its faces point outward."""
+    a, b, c = (vertices[faces[:, k]] - vertices.mean(axis=0) for k in range(3))
+    return np.asarray(np.bincount(shells, weights=np.einsum("nd,nd->n", a, np.cross(b, c)) / 6), dtype=np.float64)

@@ -1,0 +1,164 @@
+"""Triangles in bulk: which are near one another, which pierce one another, what is inside, how far the surface is."""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from trimesh.triangles import closest_point
+
+Array = NDArray[np.float64]
+Pairs = NDArray[np.int64]
+
+#: Rows that one array operation works on at most: what bounds memory.
+CHUNK = 1_000_000
+
+#: Up to this many pairs all are compared with all, without a tree.
+DENSE = 250_000
+
+#: A fixed turn, so that rays along an axis meet no edge of a mesh drawn along the axes.
+_TILT = np.linalg.qr(np.array([[0.83, 0.31, -0.47], [-0.29, 0.91, 0.28], [0.53, -0.17, 0.79]]))[0]
+
+
+def bounds(triangles: Array) -> tuple[Array, Array]:
+    """Lowest and highest corners, float64 (m, 3) each, of triangles (m, 3, 3)."""
+    return triangles.min(axis=1), triangles.max(axis=1)
+
+
+def near_pairs(first: tuple[Array, Array], second: tuple[Array, Array], limit: int) -> Pairs | None:
+    """Pairs (k, 2) of boxes, one of each set, that overlap or touch; None when there are more than `limit`.
+
+    Args:
+        first, second: lowest and highest corners, float64 (n, 3) each.
+    """
+    (low_a, high_a), (low_b, high_b) = first, second
+    if not len(low_a) or not len(low_b):
+        return np.zeros((0, 2), dtype=np.int64)
+    if len(low_a) * len(low_b) <= min(DENSE, limit):
+        meet = (low_a[:, None] <= high_b[None]).all(axis=2) & (low_b[None] <= high_a[:, None]).all(axis=2)
+        return np.argwhere(meet)
+    # A tree over the two axes along which boxes are smallest for their spread; the third axis is looked at after.
+    spread = np.ptp(low_b, axis=0) / np.maximum((high_b - low_b).mean(axis=0), 1e-300)
+    x, y = np.argsort(-spread)[:2]
+    z = 3 - x - y
+    tree = shapely.STRtree(shapely.box(low_b[:, x], low_b[:, y], high_b[:, x], high_b[:, y]))
+    asked = shapely.box(low_a[:, x], low_a[:, y], high_a[:, x], high_a[:, y])
+    found, count = [], 0
+    step = max(16, 5 * CHUNK // len(low_b))
+    for start in range(0, len(asked), step):
+        i, j = tree.query(asked[start : start + step])
+        i = i + start
+        meet = (low_a[i, z] <= high_b[j, z]) & (low_b[j, z] <= high_a[i, z])
+        found.append(np.stack([i[meet], j[meet]], axis=1))
+        count += int(meet.sum())
+        if count > limit:
+            return None
+    return np.concatenate(found).astype(np.int64)
+
+
+def are_convex(vertices: Array, triangles: Array, margin: float) -> bool:
+    """Whether no vertex (n, 3) lies above the plane of any triangle (m, 3, 3) by more than `margin`.
+
+    Only asked of meshes for which that is quick; of others the answer is no.
+    """
+    if len(vertices) * len(triangles) > 100 * CHUNK:
+        return False
+    normals = _unit_normals(triangles)
+    offsets = np.einsum("md,md->m", triangles[:, 0], normals)
+    step = max(1, 4 * CHUNK // len(triangles))
+    return all(
+        bool((vertices[start : start + step] @ normals.T <= offsets + margin).all())
+        for start in range(0, len(vertices), step)
+    )
+
+
+def _unit_normals(triangles: Array) -> Array:
+    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    return np.asarray(normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300))
+
+
+def crossing_pairs(triangles: Array, margin: float, limit: int) -> Pairs | None:
+    """Pairs (k, 2), i < j, of triangles (m, 3, 3) of which an edge goes through the other by more than `margin`.
+
+    None when more than `limit` pairs would have to be looked at. Triangles that only touch, or lie in one plane, do
+    not cross.
+    """
+    pairs = near_pairs(bounds(triangles), bounds(triangles), limit)
+    if pairs is None:
+        return None
+    normals = _unit_normals(triangles)
+    # Fans and flat caps have many neighbours in their own plane: known by one number, they are left out at once.
+    offset = np.einsum("md,md->m", triangles[:, 0], normals) / max(margin, 1e-300)
+    plane = np.unique(np.round(np.column_stack([normals * 1e6, offset])), axis=0, return_inverse=True)[1].ravel()
+    pairs = pairs[(pairs[:, 0] < pairs[:, 1]) & (plane[pairs[:, 0]] != plane[pairs[:, 1]])]
+    found = []
+    for start in range(0, len(pairs), CHUNK):
+        some = pairs[start : start + CHUNK]
+        for one, other in ((0, 1), (1, 0)):
+            plane_of, corners = some[:, one], triangles[some[:, other]]
+            height = np.einsum("kcd,kd->kc", corners - triangles[plane_of][:, :1], normals[plane_of])
+            some = some[(height.min(axis=1) < -margin) & (height.max(axis=1) > margin)]
+        i, j = some.T
+        hit = np.zeros(len(some), dtype=bool)
+        for k in range(3):
+            hit |= _pierces(triangles[i][:, [k, (k + 1) % 3]], triangles[j], normals[j], margin)
+            hit |= _pierces(triangles[j][:, [k, (k + 1) % 3]], triangles[i], normals[i], margin)
+        found.append(some[hit])
+    return np.concatenate(found) if found else pairs
+
+
+def _pierces(segments: Array, triangles: Array, normals: Array, margin: float) -> NDArray[np.bool_]:
+    """bool (k,): whether segment i, (k, 2, 3), goes through triangle i, (k, 3, 3), by more than `margin` all round."""
+    start = np.einsum("kd,kd->k", segments[:, 0] - triangles[:, 0], normals)
+    end = np.einsum("kd,kd->k", segments[:, 1] - triangles[:, 0], normals)
+    crosses = (np.minimum(start, end) < -margin) & (np.maximum(start, end) > margin)
+    share = start / np.where(crosses, start - end, 1.0)
+    point = segments[:, 0] + share[:, None] * (segments[:, 1] - segments[:, 0])
+    for k in range(3):
+        edge = triangles[:, (k + 1) % 3] - triangles[:, k]
+        height = np.einsum("kd,kd->k", point - triangles[:, k], np.cross(normals, edge))
+        crosses &= height > margin * np.linalg.norm(edge, axis=1)
+    return np.asarray(crosses)
+
+
+def are_inside(points: Array, triangles: Array) -> NDArray[np.bool_]:
+    """bool (n,): which points a closed surface (m, 3, 3) goes round, by counting its faces above each point."""
+    if not len(points) or not len(triangles):
+        return np.zeros(len(points), dtype=bool)
+    tilted, asked = triangles @ _TILT, points @ _TILT
+    # Seen from above: which faces lie over or under which points; heights are compared after.
+    flat = np.array([1.0, 1.0, 0.0])
+    low, high = bounds(tilted)
+    pairs = near_pairs((asked * flat, asked * flat), (low * flat, high * flat), 20 * CHUNK)
+    if pairs is None:
+        half = len(points) // 2
+        if not half:
+            raise MemoryError(f"{len(triangles):,} faces over one point")
+        return np.concatenate([are_inside(points[:half], triangles), are_inside(points[half:], triangles)])
+    i, j = pairs.T
+    t, p = tilted[j], asked[i]
+    area = _cross(t[:, 1] - t[:, 0], t[:, 2] - t[:, 0])
+    weights = [_cross(t[:, (k + 1) % 3] - t[:, k], p - t[:, k]) * np.sign(area) for k in range(3)]
+    over = (np.minimum(np.minimum(weights[0], weights[1]), weights[2]) >= 0) & (area != 0)
+    safe = np.where(area != 0, np.abs(area), 1.0)
+    over &= (weights[1] * t[:, 0, 2] + weights[2] * t[:, 1, 2] + weights[0] * t[:, 2, 2]) / safe > p[:, 2]
+    winding = np.bincount(i[over], weights=np.sign(area[over]), minlength=len(points))
+    return np.asarray(np.round(winding) > 0)
+
+
+def distances(points: Array, triangles: Array) -> Array:
+    """float64 (n,): how far each point is from the nearest of the triangles (m, 3, 3)."""
+    found = np.full(len(points), np.inf)
+    step = max(1, CHUNK // max(len(triangles), 1))
+    for start in range(0, len(points), step):
+        part = points[start : start + step]
+        repeated = np.repeat(part, len(triangles), axis=0)
+        nearest = closest_point(np.tile(triangles, (len(part), 1, 1)), repeated)  # type: ignore[no-untyped-call]
+        away = np.linalg.norm(nearest - repeated, axis=1).reshape(len(part), -1)
+        found[start : start + step] = away.min(axis=1)
+    return found
+
+
+def _cross(u: Array, v: Array) -> Array:
+    product: Array = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
+    return product
