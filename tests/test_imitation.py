@@ -62,6 +62,7 @@ def test_a_killed_study_goes_on(tmp_path, monkeypatch):
     shares = {line["metric"]: float(line["value"]) for line in lines if line["method"] == "sinkhorn"}
     assert shares["seen_share"] + shares["unseen_share"] == pytest.approx(1)
     assert "| 12 | sinkhorn |" in (tmp_path / "report.md").read_text()
+    assert {"curves-hard.png", "curves-hard.svg"} <= {p.name for p in tmp_path.iterdir()}
 
 
 def test_every_study_is_made_of_what_is_there():

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 from neurosym.plotting.confusion import confusion_figure
 from neurosym.plotting.curves import Curves, Spread, curves_figure
-from neurosym.plotting.density import density_figure
+from neurosym.plotting.density import density_figure, kernel_density
 from neurosym.plotting.errors import classes_figure, repeats_figure
 from neurosym.plotting.iterations import LAST_BAR, iterations_figure
 from neurosym.plotting.points import Panel, points_figure
@@ -25,6 +25,7 @@ __all__ = [
     "curves_figure",
     "density_figure",
     "iterations_figure",
+    "kernel_density",
     "look_of",
     "points_figure",
     "repeats_figure",

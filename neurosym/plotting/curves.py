@@ -15,6 +15,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+#: Of an axis with many n only so many are named.
+MOST_TICKS = 7
+
 
 @dataclass(frozen=True)
 class Curves:
@@ -102,12 +105,11 @@ def _bubbles(axis: Axes, spread: Spread) -> None:
 
 
 def _across(axis: Axes, sizes: Sequence[int], across: str, log: bool) -> None:
-    from matplotlib.ticker import NullFormatter, NullLocator
+    from matplotlib.ticker import NullLocator
 
     if log:
         axis.set_xscale("log")
-        shown = sizes if len(sizes) <= 7 else sizes[:: -(-len(sizes) // 7)]
-        axis.set_xticks(shown, [str(n) for n in shown], fontsize=SMALL)
         axis.xaxis.set_minor_locator(NullLocator())
-        axis.xaxis.set_minor_formatter(NullFormatter())
+    shown = sizes[:: -(-len(sizes) // MOST_TICKS)]
+    axis.set_xticks(shown, [str(n) for n in shown], fontsize=SMALL)
     axis.set_xlabel(f"n: {across}", fontsize=TITLE)
