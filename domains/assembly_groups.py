@@ -19,8 +19,10 @@ rests on a fall proves nothing.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from domains.assembly_paths import grid_of
 from domains.assembly_splits import Block, Splitter
 from domains.assembly_why import explain_groups
 from neurosym.errors import InputError
@@ -70,6 +72,7 @@ def apart_in_groups(
         details={**details, "anchor": list(anchors)},
         rules=rules,
         explain=rules.explain,
+        refute=rules.refute,
     )
 
 
@@ -151,6 +154,34 @@ class GroupRules:
         falling = world.in_mask(answer.moving)
         said = f"The assembly does not stand as it is: {listed(falling)} would fall."
         return Verdict(answer.stands, () if answer.stands else falling, "" if answer.stands else said)
+
+    def refute(self) -> WhyNot | None:
+        """A proof that some block never comes apart, even without gravity, where any order of splits will do."""
+        if self.setting.paths == "any" and grid_of(self.assembly) is None:
+            return None  # the searches for paths prove nothing
+        relaxed = replace(self.setting, gravity=False, held=0)
+        splitter = Splitter(self.assembly, relaxed)
+        waiting = [(Block((1 << len(self.assembly)) - 1, self.standing), self.anchors)]
+        done: list[str] = []
+        while waiting:
+            block, kept = waiting.pop()
+            refused = {}
+            for number in bits(block.parts & ~kept):
+                verdict = splitter.split(block, number, kept)
+                if verdict.holds:
+                    leaving = self.assembly.mask(verdict.how.parts)
+                    staying = block.parts & ~leaving
+                    anchors = {True: 1 << number, False: kept}
+                    done.append(self.assembly.names[number])
+                    waiting.append((Block(leaving, False), anchors[bool(leaving >> number & 1)]))
+                    waiting.append((Block(staying, block.stands), anchors[bool(staying >> number & 1)]))
+                    break
+                refused[self.assembly.names[number]] = Rejection(verdict.reason, verdict.because, proved=verdict.proved)
+            else:
+                if refused and all(r.proved for r in refused.values()):
+                    why = explain_groups(self.assembly, relaxed, tuple(done), [block], refused)
+                    return replace(why, relaxed=self.setting.gravity)
+        return None
 
     def explain(self, result: PlanResult) -> WhyNot | None:
         """Why the blocks that are left after the longest prefix do not come apart."""

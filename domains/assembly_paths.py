@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import zlib
+from dataclasses import dataclass
 
 import numpy as np
 
 from neurosym.geometry.assembly import Assembly
+from neurosym.geometry.blocking import bits
 from neurosym.geometry.grid import GridCells, cells_of
-from neurosym.geometry.paths import Path
-from neurosym.geometry.voxel_moves import Stuck, first_separation, separation_path
+from neurosym.geometry.voxel_moves import Separation, Stuck, first_separation, separation_path
+from neurosym.ways import Way
+from neurosym.why_not import listed
 
 #: Poses and ways that each kind of search may ask for one way out (`neurosym.geometry.extraction`): seconds, mostly.
 MAX_CHECKS = 20_000
@@ -18,50 +21,85 @@ MAX_CHECKS = 20_000
 MAX_STATES = 200_000
 
 
+@dataclass(frozen=True)
+class NoWay:
+    """That no way was found: why, whom the parts met, and whether that is proved (for cells: by translations)."""
+
+    reason: str
+    because: tuple[str, ...]
+    proved: bool
+
+
 def ground_of(assembly: Assembly) -> float | None:
     """Height of the plane that nothing goes through, or None."""
     return assembly.ground if assembly.has_table else None
 
 
-def way_out(assembly: Assembly, moving: int, among: int) -> Path | tuple[str, tuple[str, ...], bool]:
-    """A path on which parts (a bitset), moving as one, leave the others in `among`, which rest.
+def way_out(assembly: Assembly, moving: int, among: int, *, shifting: bool) -> Way | NoWay:
+    """A path on which parts (a bitset), moving as one, leave the others in `among`.
 
-    Returns:
-        The path; or why there is none, whom it met, and whether that is proved: for parts of cells, that no
-        translations lead out. Asked twice, the answer is the same.
+    Args:
+        shifting: whether the others may be shifted meanwhile, and go back to their places (for parts of cells). Else
+            they rest.
+
+    Asked twice, the answer is the same.
     """
-    from neurosym.geometry.extraction import Failure, extract
+    cells = grid_of(assembly)
 
-    def search() -> Path | tuple[str, tuple[str, ...], bool]:
+    def moves() -> Way | NoWay:
+        assert cells is not None
+        found = first_separation(
+            cells,
+            among,
+            fixed=assembly.fixed_mask & among,
+            ground=ground_of(assembly),
+            accept=lambda group: group == moving,
+            max_states=MAX_STATES,
+        )
+        return _way(cells, found)
+
+    def search() -> Way | NoWay:
+        from neurosym.geometry.extraction import KINDS, Failure, extract
+
         rng = np.random.default_rng([zlib.crc32(f"{moving:x} {among:x}".encode())])
-        found = extract(assembly, moving, among, rng=rng, ground=ground_of(assembly), max_checks=MAX_CHECKS)
+        kinds = KINDS if cells is None else KINDS[:1]  # on cells the lattice is all there is by translations
+        found = extract(
+            assembly, moving, among, rng=rng, ground=ground_of(assembly), kinds=kinds, max_checks=MAX_CHECKS
+        )
         if isinstance(found, Failure):
-            return found.reason, found.because, found.proved
-        return found
+            return NoWay(found.reason, found.because, found.proved and cells is not None)
+        return Way(found.leaving, path=found)
 
-    return assembly.remember(f"way out {moving:x} {among:x}", search)
+    exact = shifting and cells is not None
+    return assembly.remember(f"way out {moving:x} {among:x} {exact}", moves if exact else search)
 
 
-def separation(assembly: Assembly, block: int, *, standing: bool) -> tuple[Path, int] | bool:
+def separation(assembly: Assembly, block: int, *, standing: bool) -> Way | NoWay:
     """The first separation of a block of parts of cells into two, by shifts of groups, with the fewest moves.
 
     Args:
         block: a bitset of parts.
         standing: whether it is what stands on the ground and holds the fixed parts; otherwise it is in the hand.
-
-    Returns:
-        The path and the parts that leave (a bitset); or whether it is proved that there is none.
     """
     cells = grid_of(assembly)
     assert cells is not None
 
-    def search() -> tuple[Path, int] | bool:
+    def search() -> Way | NoWay:
         fixed = assembly.fixed_mask if standing else 0
         ground = ground_of(assembly) if standing else None
         found = first_separation(cells, block, fixed=fixed, ground=ground, max_states=MAX_STATES)
-        return found.proved if isinstance(found, Stuck) else (separation_path(cells, found), found.group)
+        return _way(cells, found)
 
     return assembly.remember(f"separation {block:x} {standing}", search)
+
+
+def _way(cells: GridCells, found: Separation | Stuck) -> Way | NoWay:
+    if isinstance(found, Separation):
+        path = separation_path(cells, found)
+        return Way(path.leaving, path=path, moves=found.level)
+    names = tuple(cells.names[p] for p in bits(found.block))
+    said = f"No moves of groups separate what is wanted of {listed(names)}, in {found.explored:,} states."
+    return NoWay(said, names, found.proved)
 
 
 def grid_of(assembly: Assembly) -> GridCells | None:

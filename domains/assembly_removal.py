@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from domains.assembly_paths import ground_of, way_out
-from domains.assembly_why import explain_removal
+from domains.assembly_paths import NoWay, ground_of, way_out
+from domains.assembly_why import explain_removal, refute_removal
 from neurosym import predicates
 from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.blocking import bits
@@ -55,6 +55,7 @@ def apart_one_by_one(
         simulation=Simulation("rigid", {n: n for n in loose}) if judged_alike else None,
         details=details,
         explain=lambda result: explain_removal(assembly, setting, pairs, result),
+        refute=lambda: refute_removal(assembly, setting),
     )
 
 
@@ -68,11 +69,11 @@ def can_leave(setting: Setting) -> Derived:
             return Verdict(True, (), verdict.reason, how=Way.along((p,), verdict.how))
         if setting.paths == "straight":
             return verdict
-        found = way_out(world, 1 << world.index[p], state.mask(present, world.names))
-        if isinstance(found, tuple):
-            reason, met, proved = found
-            return Verdict(False, met, reason, proved=proved)
-        return Verdict(True, (), f"{p} is free by a path.", how=Way((p,), path=found))
+        there = state.mask(present, world.names)
+        found = way_out(world, 1 << world.index[p], there, shifting=not setting.gravity)
+        if isinstance(found, NoWay):
+            return Verdict(False, found.because, found.reason, proved=found.proved)
+        return Verdict(True, (), f"{p} is free by a path.", how=found)
 
     def check(world: Assembly, state: State, how: Any, p: str) -> Verdict:
         if not isinstance(how, Way) or how.parts != (p,):

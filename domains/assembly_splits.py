@@ -15,7 +15,7 @@ import heapq
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from domains.assembly_paths import grid_of, ground_of, separation, way_out
+from domains.assembly_paths import NoWay, grid_of, ground_of, separation, way_out
 from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.blocking import bits
 from neurosym.geometry.sweep import exits_along
@@ -215,22 +215,19 @@ class Splitter:
         name = self.assembly.names[part]
         if not (block.stands and self.setting.gravity) and grid_of(self.assembly) is not None:
             found = separation(self.assembly, block.parts, standing=block.stands)
-            if isinstance(found, bool):
-                reason = f"No moves of groups separate {listed(self.assembly.in_mask(block.parts))}."
-                return Verdict(False, self.assembly.in_mask(block.parts & ~(1 << part)), reason, proved=found)
-            path, leaving = found
+            if isinstance(found, NoWay):
+                others = self.assembly.in_mask(block.parts & ~(1 << part))
+                return Verdict(False, others, found.reason, proved=found.proved)
+            leaving = self.assembly.mask(found.parts)
             if bool(leaving >> part & 1) == bool(leaving & anchor):
-                split = self.assembly.in_mask(leaving)
-                reason = f"{name} stays with its anchor: {listed(split)} can be separated first."
-                return Verdict(False, split, reason)
-            return Verdict(True, how=Way(path.leaving, path=path))
-        out = way_out(self.assembly, 1 << part, block.parts)
-        if isinstance(out, tuple):
-            reason, met, _ = out
+                reason = f"{name} stays with its anchor: {listed(found.parts)} can be separated first."
+                return Verdict(False, found.parts, reason)
+            return Verdict(True, how=found)
+        out = way_out(self.assembly, 1 << part, block.parts, shifting=False)
+        if isinstance(out, NoWay):
             # The part may come off together with others, which this search does not try.
-            return Verdict(False, met, reason, proved=False)
+            return Verdict(False, out.because, out.reason, proved=False)
         standing = self._standing(block, 1 << part)
         if not standing.holds:
             return Verdict(False, standing.because, standing.reason, proved=False)
-        held = standing.how.held if standing.how else ()
-        return Verdict(True, how=Way((name,), path=out, held=held))
+        return Verdict(True, how=out if standing.how is None else out.joined(standing.how))

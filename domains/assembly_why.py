@@ -17,6 +17,30 @@ if TYPE_CHECKING:
     from domains.assembly_splits import Block
 
 
+def refute_removal(assembly: Assembly, setting: Setting) -> WhyNot | None:
+    """A proof, without a search, that some parts never leave along straight lines, one at a time; None: all do.
+
+    Without gravity what is free stays free, so the order in which parts are peeled off does not matter.
+    """
+    if setting.paths != "straight":
+        return None
+    graph = assembly.blocking(setting.directions)
+    there, done = (1 << len(assembly)) - 1, list[int]()
+    while free := [p for p in bits(there) if graph.free_directions(p, there)]:
+        done += free
+        there &= ~sum(1 << p for p in free)
+    kept = there & ~assembly.fixed_mask
+    if not kept:
+        return None
+    return WhyNot(
+        after=tuple(assembly.names[p] for p in done),
+        left=assembly.in_mask(there),
+        blocked=tuple(b for p in bits(kept) for b in blockers_of(graph, p, there, table=True)),
+        cycle=smallest_cycle(graph, kept),
+        relaxed=setting.gravity,
+    )
+
+
 def explain_removal(
     assembly: Assembly, setting: Setting, before: Sequence[tuple[str, str]], result: PlanResult
 ) -> WhyNot | None:
@@ -39,7 +63,7 @@ def explain_removal(
             answer = assembly.stability().standing_when_held(there & ~(1 << part), setting.held)
             if not answer.stands:
                 falls.append(fall(assembly, 1 << part, answer.moving, setting.held))
-    kept = assembly.mask(b.part for b in blocked)
+    kept = assembly.mask({b.part for b in blocked})
     return WhyNot(
         after=done,
         left=assembly.in_mask(there),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import replace
@@ -12,7 +13,7 @@ import numpy as np
 
 from neurosym.errors import ContractError, InputError
 from neurosym.language.domain import Problem
-from neurosym.planner import Budget, Planner, PlanResult
+from neurosym.planner import Budget, Planner, PlanResult, Status
 from neurosym.prior import OrderScores, Prior
 from neurosym.problem import SearchProblem
 from neurosym.registry import load_planner, load_prior
@@ -75,6 +76,12 @@ def plans(
         raise InputError(f"Expected rng as a numpy Generator or a seed of 0 or more; got {rng!r}.")
     generator = rng if isinstance(rng, np.random.Generator) else np.random.default_rng(0 if rng is None else rng)
     scores = advice(problem, prior)
+    if problem.refute is not None and oracle == "geometry":
+        start = time.perf_counter()
+        why_not = problem.refute()
+        if why_not is not None:
+            none = PlanResult(Status.UNSOLVABLE, None, 0, 0, 0, time.perf_counter() - start, why_not=why_not)
+            return [none] if k is None else []
     with ExitStack() as stack:
         search: SearchProblem[Any] = stack.enter_context(open_oracle(problem, oracle))
         if k is None:

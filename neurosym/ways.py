@@ -30,6 +30,8 @@ class Way:
             there is a path.
         path: the motions of all that moves on the way, those of `parts` first; None for a straight line.
         held: names of parts that must be held so that what stays stands.
+        moves: of a path that shifts groups one after the other, how many moves it takes until `parts` are out, the last
+            one included; else 1.
         arrives: whether the parts come in, as in the plan of an assembly.
     """
 
@@ -37,6 +39,7 @@ class Way:
     direction: Vector | None = None
     path: Path | None = None
     held: tuple[str, ...] = ()
+    moves: int = 1
     arrives: bool = False
 
     @classmethod
@@ -47,7 +50,13 @@ class Way:
     def joined(self, other: Way) -> Way:
         """What two predicates say of one step: the one how it is done, the other what is held meanwhile."""
         held = tuple(dict.fromkeys(self.held + other.held))
-        return Way(self.parts or other.parts, self.direction or other.direction, self.path or other.path, held)
+        return Way(
+            self.parts or other.parts,
+            self.direction or other.direction,
+            self.path or other.path,
+            held,
+            max(self.moves, other.moves),
+        )
 
     def reversed(self) -> Way:
         """The same way, gone backwards: what left arrives."""
@@ -66,6 +75,8 @@ class Way:
         said: dict[str, Any] = {"how": np.asarray(self).tolist(), "parts": list(self.parts)}
         if self.path is not None:
             said["path"] = self.path.to_json()
+        if self.moves > 1:
+            said["moves"] = self.moves
         if self.held:
             said["held"] = list(self.held)
         if self.arrives:
@@ -85,13 +96,14 @@ class Way:
             direction = None if path is not None else _vector(said["how"])
         except (KeyError, TypeError, ValueError) as error:
             raise InputError(f'Expected a step with "parts" and "how", a direction or a path; got {error}.') from None
-        return cls(names, direction, path, held, bool(said.get("arrives", False)))
+        return cls(names, direction, path, held, int(said.get("moves", 1)), bool(said.get("arrives", False)))
 
     def __str__(self) -> str:
         if self.direction is not None:
             said = f"along {in_words(self.direction)}"
         elif self.path is not None:
-            said = f"{'in' if self.arrives else 'out'} by a path ({self.path.kind}, {len(self.path.poses)} poses)"
+            kind = f"{self.moves} moves" if self.path.kind == "moves" else self.path.kind
+            said = f"{'in' if self.arrives else 'out'} by a path ({kind})"
         else:
             said = ""
         if len(self.parts) > 1:

@@ -67,6 +67,7 @@ class WhyNot:
         falls: for parts that could leave, what would fall.
         waiting: pairs (a, b): a could go, but only after b.
         unproved: names of parts for which a search for a way ended without a proof that there is none.
+        relaxed: whether gravity and precedence were left aside: even so there is no plan. `after` then need not work.
     """
 
     after: tuple[str, ...]
@@ -76,12 +77,14 @@ class WhyNot:
     falls: tuple[Fall, ...] = ()
     waiting: tuple[tuple[str, str], ...] = ()
     unproved: tuple[str, ...] = ()
+    relaxed: bool = False
 
     @property
     def sentences(self) -> tuple[str, ...]:
         """The same for a person; what is long is cut, with a count."""
         start = f"After {listed(self.after)} nothing" if self.after else "Nothing"
-        said = [f"{start} can be taken out of {listed(self.left)}."]
+        relaxed = ", even if nothing could fall and any order would do" if self.relaxed else ""
+        said = [f"{start} can be taken out of {listed(self.left)}{relaxed}."]
         if self.cycle is not None:
             chain = " blocks ".join([self.cycle.parts[0], *self.cycle.parts[:0:-1], self.cycle.parts[0]])
             said.append(

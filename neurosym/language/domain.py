@@ -105,6 +105,7 @@ class Domain:
         details: Mapping[str, Any] | None = None,
         rules: Rules | None = None,
         explain: Callable[[PlanResult], WhyNot | None] | None = None,
+        refute: Callable[[], WhyNot | None] | None = None,
     ) -> Problem:
         """A problem of this domain, checked.
 
@@ -124,6 +125,7 @@ class Domain:
             details: whatever the family wants to remember.
             rules: what an action changes, where effects on fluents cannot say it.
             explain: why a result has no plan, as data.
+            refute: looks, before any search, for a proof that there is no plan, and says why; None: there may be one.
 
         Raises:
             DefinitionError: with the place of the mistake: an unknown object, a wrong type, a goal that no
@@ -145,6 +147,7 @@ class Domain:
             details=dict(details or {}),
             rules=rules,
             explain=explain,
+            refute=refute,
         )
         problem.ground()
         return problem
@@ -172,6 +175,7 @@ class Problem:
     details: Mapping[str, Any] = field(default_factory=dict)
     rules: Rules | None = None
     explain: Callable[[PlanResult], WhyNot | None] | None = None
+    refute: Callable[[], WhyNot | None] | None = None
 
     def __post_init__(self) -> None:
         place = f"problem {self.name!r} of domain {self.domain.name!r}"
