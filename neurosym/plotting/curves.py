@@ -100,8 +100,9 @@ def _bubbles(axis: Axes, spread: Spread) -> None:
             for right, pictures in enumerate(row):
                 if pictures:
                     shares[right / length] = shares.get(right / length, 0) + pictures / counts.right.sum()
-        axis.scatter([n] * len(shares), list(shares), s=[90 * s for s in shares.values()], color=look.colour, lw=0)
-    axis.set_title(f"{spread.method}, all seeds; area: share of sequences", fontsize=SMALL, loc="left", pad=2)
+        areas = [90 * share for share in shares.values()]
+        axis.scatter([n] * len(shares), list(shares), s=areas, color=look.colour, lw=0, clip_on=False)
+    axis.set_title(f"{spread.method}, all seeds; area: share of sequences", fontsize=SMALL, loc="left", pad=5)
 
 
 def _across(axis: Axes, sizes: Sequence[int], across: str, log: bool) -> None:

@@ -14,6 +14,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+#: The axis of errors ends there or above (%), so that no errors look like none.
+LEAST_TOP = 1.0
+
 
 def classes_figure(title: str, counts: Mapping[str, Counts]) -> Figure:
     """The share of each class's demonstrated steps that were read as another; in brackets, how many actions it has."""
@@ -41,8 +44,8 @@ def repeats_figure(title: str, counts: Mapping[str, Counts]) -> Figure:
     """The share of steps and of sequences read wrong, by how many of a sequence's actions repeat an earlier class."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(COLUMN, 2.3), layout="constrained")
-    steps, sequences = figure.subplots(1, 2, sharey=True)
+    figure = Figure(figsize=(COLUMN, 3.3), layout="constrained")
+    steps, sequences = figure.subplots(2, 1, sharex=True)
     first = next(iter(counts.values()))
     shown = np.flatnonzero(first.repeats[:, 2])
     for position, (method, own) in enumerate(counts.items()):
@@ -50,14 +53,11 @@ def repeats_figure(title: str, counts: Mapping[str, Counts]) -> Figure:
         for axis, (total, wrong) in ((steps, (0, 1)), (sequences, (2, 3))):
             share = 100 * own.repeats[shown, wrong] / own.repeats[shown, total]
             axis.plot(shown, share, look.line, marker=look.marker, color=look.colour, ms=4, lw=1.1, label=method)
-    for axis in (steps, sequences):
-        axis.set_xticks(shown, [f"{r}\n({first.repeats[r, 2]:,})" for r in shown])
-        axis.set_xlim(shown[0] - 0.3, shown[-1] + 0.3)
-        axis.set_xlabel("repetitions (pictures)", fontsize=TITLE)
-        axis.grid(axis="y", color="0.9", lw=0.6)
-    steps.set_title("steps", fontsize=SMALL, pad=3)
-    sequences.set_title("whole sequences", fontsize=SMALL, pad=3)
-    steps.set_ylabel("wrong (%)", fontsize=TITLE)
+            axis.grid(axis="y", color="0.9", lw=0.6)
+    steps.set_ylabel("steps wrong (%)", fontsize=TITLE)
+    sequences.set_ylabel("sequences\nwrong (%)", fontsize=TITLE)
+    sequences.set_xticks(shown, [f"{r}\n({first.repeats[r, 2]:,})" for r in shown])
+    sequences.set_xlabel("repetitions in the sequence (pictures)", fontsize=TITLE)
     _finish(figure, [steps, sequences], title)
     return figure
 
@@ -65,7 +65,8 @@ def repeats_figure(title: str, counts: Mapping[str, Counts]) -> Figure:
 def _finish(figure: Figure, axes: Sequence[Axes], title: str) -> None:
     for axis in axes:
         tidy(axis)
-        axis.set_ylim(-2, None)  # a marker at 0 is seen whole
+        top = max(axis.get_ylim()[1], LEAST_TOP)
+        axis.set_ylim(-0.04 * top, top)  # a marker at 0 is seen whole
         axis.tick_params(axis="x", length=0)
     figure.suptitle(title, fontsize=TITLE)
     handles, labels = axes[0].get_legend_handles_labels()
