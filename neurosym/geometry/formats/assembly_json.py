@@ -142,7 +142,7 @@ def _part(at: str, given: Any, read_mesh: Callable[[str], RawMesh]) -> Part | Ra
     density = _number(f"{at}.density", part.get("density", 1.0), above=0.0)
     made_of = [k for k in ("cells", "boxes", "mesh", "bodies") if k in part]
     if len(made_of) != 1:
-        raise _Odd(f"{at} has {' and '.join(made_of) or 'none'} of cells, boxes, mesh and bodies, expected one")
+        raise _Odd(f"{at} has {' and '.join(made_of) or 'no shape'}, expected one of cells, boxes, mesh and bodies")
     kind = made_of[0]
     if kind == "mesh":
         mesh = read_mesh(_text(f"{at}.mesh", part["mesh"]))
@@ -177,7 +177,7 @@ def _body(at: str, given: Any) -> Body:
     X = _pose(f"{at}.pose", body["pose"]) if "pose" in body else np.eye(4)
     kinds = [k for k in ("box", "convex", "mesh") if k in body]
     if len(kinds) != 1:
-        raise _Odd(f"{at} has {' and '.join(kinds) or 'none'} of box, convex and mesh, expected one")
+        raise _Odd(f"{at} has {' and '.join(kinds) or 'no shape'}, expected one of box, convex and mesh")
     kind = kinds[0]
     if kind == "box":
         return Body(Box(_size(f"{at}.box", body["box"])), X)
