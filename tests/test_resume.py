@@ -88,7 +88,7 @@ def table(out):
 
 def test_a_study_killed_twice_ends_as_if_it_had_not_been(tmp_path):
     out, journal = tmp_path / "killed", tmp_path / "killed" / "trials.jsonl"
-    undisturbed = start(STUDY, tmp_path / "whole", 2)
+    undisturbed = start(STUDY, tmp_path / "whole", 1)
     try:
         kill_when(start(STUDY, out, 2), lambda: lines(journal) >= 3)
         content = journal.read_bytes()
@@ -102,7 +102,7 @@ def test_a_study_killed_twice_ends_as_if_it_had_not_been(tmp_path):
         kept = Journal(journal)
         assert len(early) + 2 <= len(late) < 16
 
-        finish(start(STUDY, out, 2))
+        finish(start(STUDY, out, 1))
         finish(undisturbed)
     finally:
         undisturbed.kill()
