@@ -13,7 +13,7 @@ import numpy as np
 
 from neurosym.errors import ContractError, InputError
 from neurosym.language.domain import Problem
-from neurosym.planner import Budget, Planner, PlanResult, Status
+from neurosym.planner import Budget, OrderCount, Planner, PlanResult, Status
 from neurosym.prior import OrderScores, Prior
 from neurosym.problem import SearchProblem
 from neurosym.registry import load_planner, load_prior
@@ -114,6 +114,16 @@ def count_plans(problem: Problem) -> int:
     """How many different orders solve a problem: exact, by dynamic programming over states."""
     count: int = load_planner("exhaustive").count_plans(problem.ground())  # type: ignore[attr-defined]
     return count
+
+
+def count_orders(problem: Problem, *, budget: Budget | None = None) -> OrderCount:
+    """The same within a budget, whose end is a result: no number. A problem that is refuted at once has none."""
+    start = time.perf_counter()
+    if problem.refute is not None and problem.refute() is not None:
+        return OrderCount(0, True, 0, time.perf_counter() - start)
+    counter = load_planner("exhaustive")
+    found: OrderCount = counter.count_orders(problem.ground(), budget=budget)  # type: ignore[attr-defined]
+    return found
 
 
 class _Geometry:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from enum import Enum
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
@@ -187,6 +187,27 @@ class PlanResult:
         if self.plan is None:
             raise InputError(f"Expected a result with a plan to reverse; got {self.status.name}.")
         return self.plan.reversed()
+
+
+@dataclass(frozen=True)
+class OrderCount:
+    """In how many orders a goal can be reached.
+
+    Attributes:
+        orders: the number; None where the budget ended first.
+        exact: whether there are no others; False where something was refused without proof.
+        states: how many were looked at.
+        seconds: wall-clock time.
+    """
+
+    orders: int | None
+    exact: bool
+    states: int
+    seconds: float
+
+    def as_json(self) -> dict[str, Any]:
+        """For a file."""
+        return asdict(self)
 
 
 class SearchLog(Generic[S]):

@@ -14,7 +14,7 @@ from neurosym.geometry.directions import in_words
 from neurosym.ways import Vector
 
 #: Stands for the ground where the name of a part is expected.
-GROUND = "the table"
+GROUND = "the ground"
 
 #: Names, or sentences of one kind, beyond this many are counted, not listed; the data has them all.
 LISTED = 8
@@ -22,7 +22,7 @@ LISTED = 8
 
 @dataclass(frozen=True)
 class Blocked:
-    """A part that cannot go along a direction, and the parts (or the table) that it would hit."""
+    """A part that cannot go along a direction, and the parts (or the ground) that it would hit."""
 
     part: str
     direction: Vector

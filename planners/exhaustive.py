@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from neurosym.errors import InputError
-from neurosym.planner import Budget, Planner, PlannerTraits, PlanResult, SearchLog, Status
+from neurosym.planner import Budget, OrderCount, Planner, PlannerTraits, PlanResult, SearchLog, Status
 from neurosym.prior import OrderScores
 from neurosym.problem import Rejection, SearchProblem, Step
 from planners.evidence import fitted, representatives
@@ -115,6 +115,10 @@ class Exhaustive(Planner):
             raise InputError(f"Expected k of 0 or more; got {k}.")
         return self._best(problem, scores, k, budget, rng)[0]
 
+    def count_orders(self, problem: SearchProblem[S], *, budget: Budget | None = None) -> OrderCount:
+        """See `planners.exhaustive.count_orders`."""
+        return count_orders(problem, budget=budget)
+
     def count_plans(self, problem: SearchProblem[S]) -> int:
         """See `planners.exhaustive.count_plans`."""
         return count_plans(problem)
@@ -150,8 +154,33 @@ def count_plans(problem: SearchProblem[S]) -> int:
 
     Orders that differ only by interchangeable actions count once.
     """
+    orders = count_orders(problem).orders
+    assert orders is not None  # there was no budget to end it
+    return orders
+
+
+def count_orders(problem: SearchProblem[S], *, budget: Budget | None = None) -> OrderCount:
+    """The same within a budget: orders are summed forwards, a layer of states at a time, and only two are kept."""
     problem = _grounded(problem)
-    return _Graph(problem, SearchLog(problem)).root.orders
+    log = SearchLog(problem, budget)
+    ways: dict[tuple[S, int], int] = {(problem.initial, 0): 1}
+    orders = states = 0
+    while ways:
+        following: dict[tuple[S, int], int] = {}
+        for (state, used), count in ways.items():
+            states += 1
+            if problem.is_goal(state):
+                orders += count
+                continue
+            if log.out_of_budget():
+                return OrderCount(None, False, states, log.seconds)
+            for action in representatives(log.candidates(state), used, problem.classes):
+                answer = log.attempt((), state, action)
+                if not isinstance(answer, Rejection):
+                    key = answer.state, used | 1 << action
+                    following[key] = following.get(key, 0) + count
+        ways = following
+    return OrderCount(orders, log.all_proved, states, log.seconds)
 
 
 def order_marginals(problem: SearchProblem[S]) -> NDArray[np.float64]:

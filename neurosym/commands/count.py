@@ -1,0 +1,60 @@
+"""`neurosym count`: in how many orders an assembly comes apart, exactly."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from neurosym.commands.assemblies import (
+    AssemblyPath,
+    Directions,
+    Fixed,
+    Gravity,
+    Groups,
+    Held,
+    PathsOption,
+    Units,
+    problem_at,
+    removal_options,
+)
+from neurosym.commands.common import AsJson, print_json
+
+#: Default limits: a minute, and as many states as fit into a few hundred megabytes.
+SECONDS, EXPANSIONS = 60.0, 1_000_000
+
+
+def count(
+    path: AssemblyPath,
+    units: Units = None,
+    directions: Directions = None,
+    paths: PathsOption = None,
+    groups: Groups = None,
+    gravity: Gravity = None,
+    held: Held = None,
+    fixed: Fixed = None,
+    seconds: Annotated[float, typer.Option("--seconds", help="Budget: wall-clock time.")] = SECONDS,
+    expansions: Annotated[int, typer.Option("--expansions", help="Budget: states looked at.")] = EXPANSIONS,
+    as_json: AsJson = False,
+) -> None:
+    """Count the orders in which everything that is not fixed can be taken out: exactly, by dynamic programming.
+
+    Where the budget ends first there is no number, and the exit code says so.
+    """
+    from neurosym.pipeline import count_orders
+    from neurosym.planner import Budget, Status
+
+    problem = problem_at(path, units, removal_options(directions, paths, groups, gravity, held, fixed))
+    found = count_orders(problem, budget=Budget(seconds=seconds, expansions=expansions))
+    if as_json:
+        print_json({"path": str(path), **found.as_json()})
+    elif found.orders is None:
+        looked = f"{found.states:,} states in {found.seconds:.1f} s"
+        print(f"The budget ended after {looked}, so there is no number. Give more: --seconds, --expansions.")
+    else:
+        least = "" if found.exact else "At least "
+        print(f"{least}{found.orders:,} orders ({found.states:,} states, {found.seconds:.2f} s)")
+    if found.orders is None:
+        raise typer.Exit(Status.OUT_OF_BUDGET.exit_code)
+    if not found.exact:
+        raise typer.Exit(Status.GAVE_UP.exit_code)
