@@ -13,6 +13,9 @@ import typer
 
 from neurosym import __version__
 from neurosym.commands.compare import compare
+from neurosym.commands.count import count
+from neurosym.commands.export import export
+from neurosym.commands.inspect import inspect
 from neurosym.commands.learn import demos, train
 from neurosym.commands.plan import plan
 from neurosym.commands.replay import replay
@@ -36,6 +39,9 @@ app = typer.Typer(
 app.command("compare")(compare)
 app.command("plan")(plan)
 app.command("view")(view)
+app.command("inspect")(inspect)
+app.command("count")(count)
+app.command("export")(export)
 app.command("demos")(demos)
 app.command("train")(train)
 app.command("replay")(replay)
