@@ -18,6 +18,7 @@ from neurosym.commands.export import export
 from neurosym.commands.inspect import inspect
 from neurosym.commands.learn import demos, train
 from neurosym.commands.plan import plan
+from neurosym.commands.render import render
 from neurosym.commands.replay import replay
 from neurosym.commands.reproduce import reproduce
 from neurosym.commands.results import results
@@ -44,6 +45,7 @@ app.command("count")(count)
 app.command("export")(export)
 app.command("demos")(demos)
 app.command("train")(train)
+app.command("render")(render)
 app.command("replay")(replay)
 app.command("reproduce")(reproduce)
 app.command("results")(results)

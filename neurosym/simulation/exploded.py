@@ -1,0 +1,153 @@
+"""An exploded view: the parts pulled apart so that each can be seen, along their ways out where a plan has them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from neurosym.errors import InputError
+from neurosym.motions import Staging
+from neurosym.simulation.captions import captioned, label
+from neurosym.simulation.filming import DEFAULT_CAMERA, FilmSet
+from neurosym.simulation.looks import Camera
+from neurosym.simulation.scene import part_colours
+
+if TYPE_CHECKING:
+    from neurosym.geometry.assembly import Assembly
+
+Array = NDArray[np.float64]
+Picture = NDArray[np.uint8]
+
+#: Gap between the bounds of exploded parts, as a share of the median part's extent.
+GAP = 0.35
+#: How far parts go without a plan, at a spread of one: so many times their way from the middle.
+RADIAL = 0.9
+#: More parts than this are not named in the picture.
+MOST_NAMES = 60
+
+
+def explode(staging: Staging, *, spread: float = 1.0) -> dict[str, Array]:
+    """Where the parts are in an exploded view.
+
+    With motions, backwards: the part that leaves last stays, and each other one goes along its way out until its
+    bounds are clear of all that are placed by then. Parts without a straight way out, and all parts of a staging
+    without motions, go away from the middle.
+
+    Args:
+        staging: the plan in space; without motions the assembly alone.
+        spread: how far apart: 1 as described, 0 not at all.
+
+    Returns:
+        part name -> float64 (3,), by how much it is shifted.
+
+    Raises:
+        InputError: a spread below 0.
+    """
+    if not np.isfinite(spread) or spread < 0:
+        raise InputError(f"Expected a spread of 0 or more; got {spread!r}.")
+    assembly = staging.assembly
+    bounds = _part_bounds(assembly)
+    directions = _directions(staging)
+    if not directions:
+        middle = assembly.bounds.mean(axis=0)
+        return {name: spread * RADIAL * (b.mean(axis=0) - middle) for name, b in bounds.items()}
+    gap = GAP * float(np.median([np.ptp(b, axis=0).mean() for b in bounds.values()]))
+    shifts = {name: np.zeros(3) for name in assembly.names if name not in directions}
+    placed = [bounds[name] for name in shifts]
+    # A removal that comes first lies outermost; an arrival that comes last does too.
+    order = [m for m in staging.motions if not m.arrives][::-1] + [m for m in staging.motions if m.arrives]
+    for motion in order:
+        names = [name for name in motion.parts if name not in shifts]
+        if not names:
+            continue
+        way = directions[names[0]]
+        own = np.array([bounds[name] for name in names])
+        box = np.array([own[:, 0].min(axis=0), own[:, 1].max(axis=0)])
+        far = spread * _clear(box, placed, way, gap)
+        for name in names:
+            shifts[name] = far * way
+            placed.append(bounds[name] + far * way)
+    return {name: shifts[name] for name in assembly.names}
+
+
+def exploded_view(
+    staging: Staging,
+    *,
+    spread: float = 1.0,
+    size: tuple[int, int] = (960, 720),
+    camera: Camera = DEFAULT_CAMERA,
+    title: str = "",
+    names: bool = True,
+) -> Picture:
+    """A picture of the parts pulled apart: see `explode`.
+
+    Args:
+        size: width and height in pixels, without the words below.
+        camera: from which side.
+        title: stands below.
+        names: whether each part's name is written on it (up to `MOST_NAMES` parts).
+
+    Returns:
+        uint8 (height and a line of words, width, 3).
+    """
+    shifts = explode(staging, spread=spread)
+    bounds = _part_bounds(staging.assembly)
+    corners = [np.array(np.meshgrid(*bounds[name].T)).reshape(3, -1).T + shift for name, shift in shifts.items()]
+    where = {}
+    for name, shift in shifts.items():
+        where[name] = np.eye(4)
+        where[name][:3, 3] = shift
+    with FilmSet(
+        staging.assembly, part_colours(staging), np.concatenate(corners), size=size, camera=camera, ground=False
+    ) as film:
+        picture = film.picture(staging.assembly.names, where)
+        if names and len(shifts) <= MOST_NAMES:
+            seen = film.seen_at(staging.assembly.names, where)
+            picture = label(picture, seen)
+    count = len(shifts)
+    return captioned(picture, title or "exploded view", note=f"{count} part{'s' if count != 1 else ''}")
+
+
+def _directions(staging: Staging) -> dict[str, Array]:
+    """Part -> unit vector of its way out, where that is straight, or at least ends somewhere else."""
+    found: dict[str, Array] = {}
+    for motion in staging.motions:
+        way = motion.path[-1][:3, :3] @ motion.centre + motion.path[-1][:3, 3] - motion.centre
+        length = float(np.linalg.norm(way))
+        if length > 0:
+            found |= dict.fromkeys(motion.parts, way / length)
+    return found
+
+
+def _part_bounds(assembly: Assembly) -> Mapping[str, Array]:
+    """Part -> float64 (2, 3)."""
+    found = {}
+    for number, name in enumerate(assembly.names):
+        own = assembly.body_bounds[assembly.owners == number]
+        found[name] = np.array([own[:, 0].min(axis=0), own[:, 1].max(axis=0)])
+    return found
+
+
+def _clear(box: Array, placed: Sequence[Array], way: Array, gap: float) -> float:
+    """How far a box (2, 3) must go along a unit vector until it is `gap` away from all others.
+
+    Moved by t, two boxes overlap along an axis for t in an interval, in all while t is in all three: past its end.
+    """
+    far = 0.0
+    for other in placed:
+        enter, leave = -np.inf, np.inf
+        for axis in range(3):
+            low, high = other[0, axis] - gap - box[1, axis], other[1, axis] + gap - box[0, axis]
+            if abs(way[axis]) < 1e-9:
+                # Side by side along this axis, without a gap, is apart.
+                if not low + gap < 0 < high - gap:
+                    enter, leave = np.inf, -np.inf
+                continue
+            first, last = sorted((low / way[axis], high / way[axis]))
+            enter, leave = max(enter, first), min(leave, last)
+        if enter < leave and leave > 0:
+            far = max(far, leave)
+    return float(far)
