@@ -122,20 +122,22 @@ def test_levels_are_those_of_a_search_over_all_subsets(cells):
 
 
 @given(puzzles(), st.booleans())
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=60, deadline=None)
+@example(BOLTS.cells, False)
 def test_fixed_parts_stay_and_nothing_goes_below_the_ground(cells, on_ground):
     if len(cells) < 2:
         return
-    fixed = next(iter(cells))
+    fixed = max(cells, key=lambda name: len(cells[name]))
+    mask = 1 << list(cells).index(fixed)
     floor = min(c[2] for own in cells.values() for c in own) if on_ground else None
     expected = brute_level(cells, fixed={fixed}, floor=floor, cap=150)
     ground = None if floor is None else float(floor)
-    found = first_separation(grid(cells), (1 << len(cells)) - 1, fixed=1, ground=ground)
+    found = first_separation(grid(cells), (1 << len(cells)) - 1, fixed=mask, ground=ground)
     if expected == -1:
         return
     assert (found.level if isinstance(found, Separation) else None) == expected
     if isinstance(found, Separation):
-        assert not any(m.group & 1 for m in found.moves)
+        assert not any(m.group & mask for m in found.moves)
         assert not (on_ground and found.moves[-1].direction == (0, 0, -1))
 
 
@@ -243,7 +245,7 @@ def test_only_wanted_groups_leave():
     free = first_separation(on_grid, 0b11111)
     assert isinstance(free, Separation)
     for part in range(5):
-        found = first_separation(on_grid, 0b11111, accept=lambda group, part=part: group == 1 << part)
+        found = first_separation(on_grid, 0b11111, accept=lambda g, p=part: g == 1 << p, max_states=500)
         if isinstance(found, Separation):
             assert found.group == 1 << part
             assert found.level >= free.level
@@ -286,3 +288,45 @@ def test_bad_questions_are_refused():
         read_layers("... ...")
     with pytest.raises(InputError, match="level-4"):
         burr("level-5")
+
+
+def test_a_fixed_part_stays_however_small_it_is():
+    on_grid = grid(STRAIGHT.cells)
+    for part in range(5):
+        found = first_separation(on_grid, 0b11111, fixed=1 << part)
+        assert isinstance(found, Separation)
+        assert not any(move.group >> part & 1 for move in found.moves)
+        assert found.rest >> part & 1
+
+
+def test_where_nothing_is_wanted_the_search_ends():
+    # Parts that are out of one another altogether are followed no farther, or the search would never end.
+    cells = read_layers(
+        """
+        aba
+        aaa
+        """
+    )
+    found = first_separation(grid(cells), 0b11, accept=lambda group: False, max_states=2_000)
+    assert isinstance(found, Stuck)
+    assert found.proved
+    assert found.explored > 10
+
+
+def test_another_part_makes_way_for_the_one_that_is_wanted():
+    # The tray t can leave upwards at once; drawn along by one cell, it lets w out of its pocket through its hole.
+    cells = read_layers(
+        """
+        ffffff  ffffff  .ttt..
+        ffffff  fffwff  .t.t..
+        ffffff  ffffff  .ttt..
+        """
+    )
+    first = first_separation(grid(cells), 0b111, fixed=1)
+    assert isinstance(first, Separation)
+    assert first.level == 1
+    wanted = 1 << list(cells).index("w")
+    found = first_separation(grid(cells), 0b111, fixed=1, accept=lambda group: group == wanted)
+    assert isinstance(found, Separation)
+    assert found.group == wanted
+    assert found.level == 2

@@ -134,7 +134,8 @@ def first_separation(
             together, so it matters only where there are fixed parts.
         start: offsets of parts that are not in their assembled places.
         accept: which groups are wanted; a group that leaves is the smallest that holds one of its parts. Other
-            groups then stay in the block: states in which they are out of it altogether are left aside.
+            groups may make way, but stay by the block: states in which a plane with room about it divides the parts
+            are left aside. That can be many states: give `max_states`.
         max_states: how many states may be visited.
         seconds: how long it may take; None: however long. Where this ends a search, another run may go farther.
 
@@ -266,10 +267,9 @@ class _Search:
             for mask in self.masks
         ]
         every = np.concatenate(self.bodies)
-        if np.ptp(every, axis=0).max() * 8 >= RADIX:
-            raise InputError(
-                f"Expected a block of at most {RADIX // 8} cells across; got {int(np.ptp(every, axis=0).max())}."
-            )
+        self.across = int(np.ptp(every, axis=0).max()) + 1
+        if self.across * 8 >= RADIX:
+            raise InputError(f"Expected a block of fewer than {RADIX // 8} cells across; got {self.across}.")
         self.count = len(self.masks)
         self.all = (1 << self.count) - 1
         self.pairs = [(i, j) for i in range(self.count) for j in range(i + 1, self.count)]
@@ -383,7 +383,9 @@ class _Search:
         """(direction, steps, group) for all moves: unions of closures."""
         for d in range(6):
             drives = edges[d]
-            for steps in range(1, 1 + max((gap for gap, _, _ in drives), default=0)):
+            # What can go farther than any finite gap can leave. Where other groups are wanted, it may only make way.
+            farthest = max((gap for gap, _, _ in drives), default=0)
+            for steps in range(1, 1 + (farthest if self.accept is None else self.across)):
                 closures = list(self._closures(drives, steps, 1))
                 if not closures:
                     break
@@ -394,13 +396,13 @@ class _Search:
                     yield d, steps, group
 
     def _out(self, state: tuple[int, ...]) -> bool:
-        """Whether a plane across one of the axes has parts on both sides and cuts none."""
+        """Whether a layer of cells across one of the axes is empty between parts on both sides."""
         offsets = [_decoded(at) for at in state]
         for axis in range(3):
             spans = sorted((int(b[0][axis]) + o[axis], int(b[1][axis]) + o[axis]) for b, o in zip(self.bounds, offsets))
             top = spans[0][1]
             for low, high in spans[1:]:
-                if low >= top:
+                if low > top:
                     return True
                 top = max(top, high)
         return False
