@@ -1,4 +1,4 @@
-"""Paths for parts that no straight line takes out: a lattice of translations, then OMPL. The only door to OMPL.
+"""Paths for parts that no straight line takes out: a lattice of translations, then OMPL.
 
 Searches are counted in checks of poses, not in seconds, so the same seed gives the same path on any machine. OMPL's
 own random numbers have one seed a process, set anew for each search from the caller's generator (generators made by
