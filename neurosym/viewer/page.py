@@ -131,15 +131,16 @@ class Page:
 
     def _build_form(self) -> None:
         gui, query = self.server.gui, self.query
-        domains = tuple(dict.fromkeys([*self.given, *domain_names()]))
-        priors = tuple(dict.fromkeys([NO_PRIOR, *prior_names(), query.prior or NO_PRIOR]))
-        self.domain = gui.add_dropdown("Domain", domains, initial_value=query.domain)
+        prior = query.prior or NO_PRIOR
+        self.domain = gui.add_dropdown("Domain", _offered(*self.given, *domain_names()), initial_value=query.domain)
         self.number = gui.add_text("Problem", "" if query.number is None else str(query.number), hint="its number")
         self.options = gui.add_text(
             "Options", _written(query.options), hint='of the domain: collapse=rigid; removed=["V"]'
         )
-        self.planner = gui.add_dropdown("Planner", tuple(planner_names()), initial_value=query.planner)
-        self.prior = gui.add_dropdown("Prior", priors, initial_value=query.prior or NO_PRIOR)
+        self.planner = gui.add_dropdown(
+            "Planner", _offered(*planner_names(), query.planner), initial_value=query.planner
+        )
+        self.prior = gui.add_dropdown("Prior", _offered(NO_PRIOR, *prior_names(), prior), initial_value=prior)
         self.oracle = gui.add_dropdown("Oracle", ORACLES, initial_value=query.oracle)
         self.seed = gui.add_text("Seed", str(query.seed))
         self.seconds = gui.add_text(
@@ -216,6 +217,8 @@ class Page:
         if (name, there) == self._facts_for:
             return
         self._facts_for = (name, there)
+        # The first question about a large assembly takes seconds.
+        self.part_tab.content = panels.styled("<p class='quiet'>Asking geometry …</p>")
         try:
             self.part_tab.content = panels.styled(panels.facts(part_facts(timeline.staging.assembly, name, there)))
         except REFUSED as error:
@@ -295,6 +298,11 @@ class Page:
 def _assign(handle: Any, value: object) -> None:
     """Set a control. (viser's setter stands apart from its getter, and type checkers take it for read-only.)"""
     handle.value = value
+
+
+def _offered(*names: str) -> tuple[str, ...]:
+    """Names to choose from, each once; what a plan's file names is among them even where it is not installed."""
+    return tuple(dict.fromkeys(names))
 
 
 def _whole(label: str, text: str) -> int:

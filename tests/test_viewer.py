@@ -1,0 +1,786 @@
+"""The viewer: the film of a plan, facts, panels, planning in a thread, the page in a browser, the export."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import shutil
+import subprocess
+import sys
+import time
+from collections import Counter
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import neurosym as ns
+from neurosym.cli import main
+from neurosym.geometry.meshes import signed_volume
+from neurosym.motions import Motion, Staging, stage, steps_in_space
+from neurosym.viewer import panels
+from neurosym.viewer.facts import part_facts
+from neurosym.viewer.session import Planning, Query, Shown, problem_maker
+from neurosym.viewer.solids import solids
+from neurosym.viewer.sources import open_source
+from neurosym.viewer.timeline import ABSENT, APART, IN_PLACE, ON_PATH, Timeline
+
+UP = (0.0, 0.0, 1.0)
+RIGID = {"collapse": "rigid"}
+
+
+def call(*arguments) -> int:
+    with pytest.raises(SystemExit) as left:
+        main([str(a) for a in arguments])
+    return int(left.value.code or 0)
+
+
+@pytest.fixture(scope="module")
+def soma():
+    problem = ns.load_domain("soma").problem(17, **RIGID)
+    return problem, ns.solve(problem)
+
+
+@pytest.fixture(scope="module")
+def film(soma):
+    problem, result = soma
+    return Timeline(stage(problem, result.plan, result.how))
+
+
+@pytest.fixture(scope="module")
+def shown():
+    query = Query("soma", 17, RIGID, "best-first", "random")
+    planning = Planning(problem_maker(query, {}), query)
+    assert planning.wait(60)
+    assert planning.message is None
+    return planning.shown
+
+
+class Slow:
+    """A problem whose every attempt takes a while, and for which there is no plan."""
+
+    def __init__(self, parts=9, seconds=0.02):
+        part = ns.Type("part")
+        present = ns.Fluent("present", part)
+        self.asked = 0
+
+        @ns.derived(part)
+        def allowed(world, state, p):
+            self.asked += 1
+            time.sleep(seconds)
+            return ns.Verdict(p != "p0", (), "not that one")
+
+        p = part("p")
+        remove = ns.Action("remove", p, pre=[present(p), allowed(p)], eff=[~present(p)], label="{p}")
+        world = ns.Assembly.from_cells({f"p{i}": [(i, 0, 0)] for i in range(parts)})
+        self.problem = ns.Domain("slow", fluents=[present], actions=[remove]).problem(
+            world=world, objects={part: world.names},
+            init=[present(n) for n in world.names], goal=[~present(n) for n in world.names], name="slow",
+        )  # fmt: skip
+
+
+# -- the film -----------------------------------------------------------------------------------------------------
+
+
+def test_between_steps_each_part_is_in_the_work_or_set_down_before_it(soma, film):
+    _, result = soma
+    for step in range(film.n_steps + 1):
+        gone = set(result.plan[:step])
+        assert set(film.state_at(step)) == set(film.names) - gone
+        X = film.motions(step)
+        for i, name in enumerate(film.names):
+            assert film.where[step, i] == (APART if name in gone else IN_PLACE)
+            assert np.allclose(X[i, :3, :3], np.eye(3))
+            assert np.allclose(X[i, :3, 3], 0) == (name not in gone)
+    assert film.visible(3.5).all()
+
+
+def test_a_part_leaves_along_the_path_of_its_step_while_the_others_rest(soma, film):
+    _, result = soma
+    for step, (name, how) in enumerate(zip(result.plan, result.how)):
+        i, direction = film.names.index(name), np.asarray(how)
+        others = [k for k in range(len(film.names)) if k != i]
+        before, far = film.motions(step), []
+        for share in np.linspace(0.01, ON_PATH, 9):
+            X = film.motions(step + share)
+            assert (X[others] == before[others]).all()
+            assert np.allclose(np.cross(X[i, :3, 3], direction), 0)
+            far.append(X[i, :3, 3] @ direction)
+        assert (np.diff(far) > 0).all()
+        assert far[-1] == pytest.approx(film.staging.motions[step].length)
+        assert film.step_at(step) is None
+        assert film.step_at(step + 0.5) == step
+
+
+def test_a_plan_that_puts_together_is_the_film_backwards(soma, film):
+    problem, result = soma
+    back = ns.planner.Plan(result.plan, [ns_way(n, h) for n, h in zip(result.plan, result.how)]).reversed()
+    reverse = Timeline(stage(problem, back, back.how))
+    assert reverse.backwards
+    assert (reverse.where == film.where[::-1]).all()
+    # Rows are in the order of either plan; what is in the work, or on its path, is where it was.
+    for step, share in itertools.product(range(film.n_steps), (0.0, 0.2, 0.5, ON_PATH)):
+        there = film.where[step] == IN_PLACE
+        assert there.any()
+        assert np.allclose(reverse.motions(film.n_steps - step - share)[there], film.motions(step + share)[there])
+
+
+def ns_way(name, how):
+    from neurosym.ways import Way
+
+    return Way.along((name,), how)
+
+
+def test_the_tower_is_built_from_above():
+    problem = ns.load_domain("tower").problem(5)
+    result = ns.solve(problem)
+    film = Timeline(stage(problem, result.plan, result.how))
+    assert (film.where[0] == APART).all()
+    assert (film.where[-1] == IN_PLACE).all()
+    for step in range(film.n_steps):
+        heights = [film.frames(step + s)[0][step, 2] for s in np.linspace(1 - ON_PATH, 1, 7)]
+        assert (np.diff(heights) < 0).all()
+
+
+def test_tiles_are_laid_flat_with_their_faces_up():
+    problem = ns.load_domain("scrabble").problem(5)
+    result = ns.solve(problem)
+    staging = stage(problem, result.plan)
+    assert staging.assembly.names == result.plan
+    assert set(staging.tops) == set(result.plan)
+    film = Timeline(staging)
+    positions = film.frames(film.n_steps)[0]
+    assert np.allclose(positions[:, 1:], positions[0, 1:])
+    assert (np.diff(positions[:, 0]) > 1).all()
+
+
+def test_a_group_is_set_down_as_one_and_taken_apart_there():
+    cells = {"base": [(0, 0, 0)], "a": [(0, 0, 1)], "b": [(0, 0, 2)]}
+    world = ns.Assembly.from_cells(cells)
+    motions = steps_in_space(world, world.names, ["a", "b"], [("a", "b"), ("b",)], [UP, UP])
+    film = Timeline(Staging(world, world.names, motions))
+    first, second = film.shifts[1], film.shifts[2]
+    assert (first[1] == first[2]).all()
+    assert first[1].any()
+    assert (second[1] == first[1]).all(), "what the other was taken off stays where it is"
+    assert not np.allclose(second[2], first[2])
+    # The second path begins where the group was set down.
+    assert np.allclose(film.motions(1.001)[2, :3, 3], first[2], atol=0.01)
+
+
+def test_parts_that_make_way_are_back_in_place_afterwards():
+    world = ns.Assembly.from_cells({"a": [(0, 0, 0)], "b": [(1, 0, 0)]})
+    path, aside = np.tile(np.eye(4), (3, 1, 1)), np.tile(np.eye(4), (3, 1, 1))
+    path[1:, 2, 3], aside[1:, 0, 3] = (1.0, 4.0), 0.5
+    motion = Motion("a", ("a",), path, aside=((("b",), aside, np.zeros(3)),))
+    film = Timeline(Staging(world, world.names, (motion,)))
+    assert film.motions(ON_PATH)[1, 0, 3] == pytest.approx(0.5)
+    assert np.allclose(film.motions(1.0)[1], np.eye(4))
+    assert film.motions(0.999)[1, 0, 3] < 0.05
+
+
+def test_turning_paths_turn_the_part():
+    world = ns.Assembly.from_cells({"a": [(0, 0, 0)], "b": [(1, 0, 0)]})
+    path = np.tile(np.eye(4), (2, 1, 1))
+    path[1, :3, :3] = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
+    path[1, 2, 3] = 3.0
+    film = Timeline(Staging(world, world.names, (Motion("a", ("a",), path, centre=np.full(3, 0.5)),)))
+    turns = film.frames(ON_PATH)[1]
+    assert np.allclose(turns[0], [np.sqrt(0.5), 0, 0, np.sqrt(0.5)])
+    assert np.allclose(turns[1], [1, 0, 0, 0])
+    assert np.allclose(film.frames(1.0)[1], [1, 0, 0, 0])
+
+
+def test_what_leaves_and_comes_back_is_in_place_again():
+    world = ns.Assembly.from_cells({"a": [(0, 0, 0)], "b": [(1, 0, 0)]})
+    (out,) = steps_in_space(world, world.names, ["a"], [("a",)], [UP])
+    film = Timeline(Staging(world, world.names, (out, replace(out, arrives=True))))
+    assert film.where[:, 0].tolist() == [IN_PLACE, APART, IN_PLACE]
+    assert np.allclose(film.motions(2.0), np.eye(4))
+    assert np.allclose(film.motions(1.001)[0, :3, 3], film.shifts[1, 0], atol=0.01)
+
+
+def test_parts_that_were_gone_before_are_not_seen():
+    problem = ns.load_domain("soma").problem(17, removed=["V"], **RIGID)
+    result = ns.solve(problem)
+    film = Timeline(stage(problem, result.plan, result.how))
+    gone = film.names.index("V")
+    assert (film.where[:, gone] == ABSENT).all()
+    assert [bool(film.visible(t)[gone]) for t in (0.0, 2.5, 6.0)] == [False] * 3
+
+
+@st.composite
+def removals(draw):
+    """Random parts in one row a part, taken away in a random order along random axes."""
+    n = draw(st.integers(2, 6))
+    columns = draw(st.lists(st.integers(1, 4), min_size=n, max_size=n))
+    world = ns.Assembly.from_cells({f"p{i}": [(i, 0, z) for z in range(c)] for i, c in enumerate(columns)})
+    order = draw(st.permutations(world.names))
+    axes = draw(st.lists(st.sampled_from([UP, (0.0, 1.0, 0.0), (0.0, -1.0, 0.0)]), min_size=n, max_size=n))
+    return Staging(world, world.names, steps_in_space(world, world.names, order, [(name,) for name in order], axes))
+
+
+@settings(max_examples=25, deadline=None)
+@given(removals())
+def test_the_film_has_no_cuts_and_nothing_is_set_down_on_anything(staging):
+    film = Timeline(staging)
+    times = np.linspace(0, film.n_steps, film.n_steps * 100 + 1)
+    frames = np.array([film.frames(t)[0] for t in times])
+    extent = np.ptp(film.bounds(), axis=0).max()
+    assert np.abs(np.diff(frames, axis=0)).max() < 0.15 * extent
+    boxes = film.bounds_at_rest + film.shifts[-1][:, None]
+    for a, b in itertools.combinations(boxes, 2):
+        assert ((a[1] <= b[0] + 1e-9) | (b[1] <= a[0] + 1e-9)).any()
+    assert np.allclose(boxes[:, 0, 2], staging.assembly.ground)
+    low, high = film.bounds()
+    assert (boxes[:, 0] >= low - 1e-9).all()
+    assert (boxes[:, 1] <= high + 1e-9).all()
+
+
+@pytest.mark.parametrize("t", [float("nan"), float("inf")])
+def test_a_time_is_a_number(film, t):
+    with pytest.raises(ns.InputError, match="time"):
+        film.motions(t)
+
+
+def test_times_beyond_the_ends_are_the_ends(film):
+    assert (film.motions(-3) == film.motions(0)).all()
+    assert (film.motions(99) == film.motions(film.n_steps)).all()
+
+
+# -- solids -------------------------------------------------------------------------------------------------------
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.sets(st.tuples(*[st.integers(0, 2)] * 3), min_size=1, max_size=12))
+def test_a_solid_is_the_surface_of_its_cells(cells):
+    (solid,) = solids(ns.Assembly.from_cells({"a": sorted(cells)}))
+    assert signed_volume(solid.vertices, solid.faces) == pytest.approx(len(cells))
+    steps = [(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)]
+    open_sides = sum(tuple(np.add(c, s)) not in cells for c in cells for s in steps)
+    assert len(solid.faces) == 2 * open_sides
+    # No edge of the outline lies between two squares of one plane.
+    assert len(solid.outline) <= 4 * open_sides
+
+
+def test_the_outline_of_a_cube_has_twelve_edges():
+    (solid,) = solids(ns.Assembly.from_cells({"a": list(itertools.product(range(2), repeat=3))}))
+    # Each edge of the large cube is two of the small ones'.
+    assert len(solid.outline) == 24
+    assert np.ptp(solid.outline.reshape(-1, 3), axis=0).tolist() == [2, 2, 2]
+
+
+def test_round_things_are_outlined_at_their_sharp_edges_only():
+    import trimesh
+
+    cylinder = trimesh.creation.cylinder(radius=1, height=2, sections=40)
+    (solid,) = solids(ns.Assembly.from_meshes({"a": cylinder}))
+    assert len(solid.outline) == 80
+
+
+# -- facts --------------------------------------------------------------------------------------------------------
+
+
+def test_facts_agree_with_what_planners_ask(soma):
+    problem, _ = soma
+    world, there = problem.world, problem.world.names
+    free = ns.predicates.free(next(f for f in problem.domain.fluents if f.name == "present"))
+    for name in world.names:
+        found = part_facts(world, name, there)
+        state = ns.language.grounding.BitState(problem.ground(), problem.ground().initial)
+        verdict = free.function(world, state, name)
+        assert any(way.free for way in found.ways) == verdict.holds
+        assert {b for way in found.ways for b in way.blockers} >= set(verdict.because)
+        for other in found.touches:
+            assert name in part_facts(world, other, there).touches
+        for other in found.carries:
+            assert name in part_facts(world, other, there).stands_on
+        assert set(found.stands_on) | set(found.carries) <= set(found.touches)
+
+
+def test_facts_speak_of_the_parts_that_are_there():
+    world = ns.Assembly.from_cells({"low": [(0, 0, 0)], "high": [(0, 0, 1)]})
+    both, alone = (part_facts(world, "low", there) for there in (world.names, ("low",)))
+    assert both.carries == ("high",)
+    assert both.on_table
+    ways = {way.direction: way for way in both.ways}
+    assert ways["+z"].blockers == ("high",)
+    assert ways["-z"].into_table
+    assert ways["+x"].free
+    assert alone.carries == alone.touches == ()
+    assert not part_facts(world, "high", ("low",)).present
+    with pytest.raises(ns.UnknownNameError, match="lo"):
+        part_facts(world, "lo", world.names)
+
+
+# -- panels -------------------------------------------------------------------------------------------------------
+
+
+def test_panels_escape_what_names_hold(shown):
+    evil = "<img src=x onerror=alert(1)>"
+    search = replace(
+        shown.search,
+        steps=(evil,),
+        settings=evil,
+        sentence=evil,
+        refusals=(ns.Refusal((evil,), evil, evil), ns.Refusal((), evil, evil)),
+    )
+    scores = ns.OrderScores.uniform(1, [evil])
+    world = ns.Assembly.from_cells({evil: [(0, 0, 0)], "b": [(0, 0, 1)]})
+    nasty = replace(shown, search=search, timeline=None, notes=(evil,))
+    texts = [
+        panels.overview(nasty),
+        panels.steps(nasty, 0),
+        panels.caption(nasty, 0.0),
+        panels.refusals(search),
+        panels.scores_table(scores, [evil], [evil]),
+        panels.facts(part_facts(world, "b", world.names)),
+        panels.facts(part_facts(world, evil, world.names)),
+        panels.message(evil),
+    ]
+    for text in texts:
+        assert "<img src=x" not in text
+    assert sum("&lt;img" in text for text in texts) == len(texts) - 1  # a caption without a film names the problem
+
+
+def test_attempts_come_in_order_with_the_plan_between():
+    refusals = (
+        ns.Refusal((), "b", "b is under a"),
+        ns.Refusal(("a",), "c", "c is fixed"),
+        ns.Refusal(("a", "x"), "y", "elsewhere"),
+    )
+    search = make_search(("a", "b"), refusals)
+    text = panels.refusals(search)
+    places = [text.index(w) for w in ("b is under a", "1. a<", "c is fixed", "elsewhere", "2. b<")]
+    assert places == sorted(places)
+    many = make_search((), refusals[:1] * (panels.MOST_REFUSALS + 7))
+    assert "7 more refusals" in panels.refusals(many)
+
+
+def make_search(steps, refusals):
+    from neurosym.viewer.session import Search
+
+    return Search(steps, (), ns.Status.SOLVED, "", refusals, {}, "")
+
+
+@pytest.mark.parametrize(("rows", "columns"), [(7, 7), (6, 98), (1, 1), (0, 3)])
+def test_scores_are_cells_with_what_was_taken_ringed(rows, columns):
+    rng = np.random.default_rng(0)
+    names = [f"a{j}" for j in range(columns)]
+    scores = ns.OrderScores(rng.normal(size=(rows, columns)), tuple(names))
+    taken = [names[-1 - i] for i in range(rows)]
+    text = panels.scores_table(scores, names, taken)
+    assert text.count("stroke=") == rows
+    shown_columns = min(columns, panels.MOST_COLUMNS)
+    assert text.count("<title>") == rows * shown_columns
+    assert ("left out" in text) == (columns > panels.MOST_COLUMNS)
+    for name in taken:
+        assert f">{name}<" in text, "what was taken is never left out"
+
+
+def test_large_tables_of_scores_are_pictures():
+    names = [f"a{j}" for j in range(184)]
+    text = panels.scores_table(ns.OrderScores.uniform(184, names), names, names)
+    assert text.startswith("<img src='data:image/png;base64,")
+    assert len(text) < 20_000
+
+
+def test_without_a_prior_the_panel_says_so():
+    assert "without a prior" in panels.scores_table(None, ["a"], ["a"])
+
+
+# -- planning in a thread -------------------------------------------------------------------------------------------
+
+
+def test_a_search_is_shown_with_its_prior_and_pictures(shown):
+    assert shown.search.solved
+    assert shown.search.scores.actions == shown.problem.actions
+    assert shown.pictures.shape == (4, 64, 64, 3)
+    assert shown.timeline.n_steps == 7
+    assert shown.notes == ()
+    counts = shown.search.counts
+    assert counts["attempts"] >= counts["iterations"] + 7
+    assert len(shown.search.refusals) == counts["iterations"]
+
+
+@pytest.mark.parametrize("planner", ns.planner_names())
+def test_a_stop_ends_every_planner(planner):
+    slow = Slow()
+    planning = Planning(lambda: slow.problem, Query("slow", planner=planner))
+    while slow.asked < 3 and planning.running:
+        time.sleep(0.01)
+    planning.stop()
+    assert planning.wait(5)
+    if planner == "swap-repair" and planning.shown.search.status is ns.Status.GAVE_UP:
+        return
+    assert planning.shown.search.status is ns.Status.OUT_OF_BUDGET
+    assert "Stopped" in planning.shown.search.sentence
+    assert planning.shown.timeline is not None
+    asked = slow.asked
+    time.sleep(0.1)
+    assert slow.asked == asked, "nothing goes on behind the page"
+
+
+def test_progress_is_told_while_the_search_goes_on():
+    slow = Slow()
+    planning = Planning(lambda: slow.problem, Query("slow", planner="exhaustive"))
+    while planning.progress.attempts < 3:
+        time.sleep(0.01)
+    now = planning.progress
+    planning.stop()
+    assert now.phase == "searching"
+    assert now.steps == 9
+    assert now.seconds > 0
+    assert "attempts" in panels.progress(now, stopping=False)
+    assert planning.wait(5)
+
+
+def test_a_stop_before_the_search_begins_is_heeded():
+    slow = Slow()
+
+    def make():
+        planning.stop()
+        return slow.problem
+
+    planning = Planning(lambda: (time.sleep(0.05), make())[1], Query("slow"))
+    assert planning.wait(5)
+    assert planning.shown is None
+    assert "before" in planning.message
+    assert slow.asked == 0
+
+
+def test_what_is_refused_is_a_message_and_so_is_a_fault():
+    def refused():
+        raise ns.AssemblyError("Expected parts; got none.")
+
+    def faulty():
+        raise ZeroDivisionError("oh")
+
+    planning = Planning(refused, Query("x"))
+    planning.wait(5)
+    assert planning.message == "Expected parts; got none."
+    planning = Planning(faulty, Query("x"))
+    planning.wait(5)
+    assert planning.message == "Planning failed with an unexpected ZeroDivisionError: oh"
+
+
+def test_a_budget_is_watched_by_a_function():
+    seen = []
+    problem = ns.load_domain("soma").problem(17)
+    result = ns.solve(problem, budget=ns.Budget(watch=lambda log: seen.append(log.attempts) or len(seen) > 4))
+    assert result.status is ns.Status.OUT_OF_BUDGET
+    assert seen == sorted(seen)
+    assert len(seen) == 5
+    assert ns.Budget(watch=lambda log: False) == ns.Budget()
+    assert ns.Budget(attempts=3).limits == {"seconds": None, "attempts": 3, "expansions": None}
+    with pytest.raises(ns.InputError, match="watch"):
+        ns.Budget(watch=True)
+
+
+# -- what it is pointed at --------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def plan_file(tmp_path, capsys):
+    path = tmp_path / "plan.json"
+    call("plan", "soma", "--problem", 17, "--collapse", "rigid", "--prior", "random", "--out", path)
+    capsys.readouterr()
+    return path
+
+
+def test_a_plan_is_opened_as_it_was_made(plan_file):
+    source = open_source(Query(str(plan_file)))
+    document = json.loads(plan_file.read_text())
+    shown = Shown.saved(source.saved)
+    assert list(shown.search.steps) == document["plan"]
+    assert shown.search.counts["iterations"] == document["iterations"]
+    assert len(shown.search.refusals) == len(document["refusals"])
+    assert shown.search.scores is not None
+    assert all(m.given for m in shown.timeline.staging.motions)
+    assert (source.query.domain, source.query.number, source.query.prior) == ("soma", 17, "random")
+    assert source.query.options["collapse"] == "rigid"
+
+
+def test_a_prior_that_is_gone_leaves_a_note(plan_file):
+    document = json.loads(plan_file.read_text()) | {"prior": "gone.safetensors"}
+    plan_file.write_text(json.dumps(document))
+    shown = Shown.saved(open_source(Query(str(plan_file))).saved)
+    assert shown.search.scores is None
+    assert "gone.safetensors" in shown.notes[0]
+
+
+def test_a_search_that_found_nothing_is_worth_a_look(tmp_path, capsys):
+    path = tmp_path / "none.json"
+    before = [part for other in "VTZABP" for part in ("--before", f"L,{other}")]
+    assert call("plan", "soma", "--problem", 17, *before, "--out", path) == 11
+    shown = Shown.saved(open_source(Query(str(path))).saved)
+    assert shown.search.status is ns.Status.UNSOLVABLE
+    assert shown.search.refusals
+    assert shown.timeline.n_steps == 0
+    assert (shown.timeline.where == IN_PLACE).all()
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"refusals": None}, "plan's file"),
+        ({"status": "SOLVED?"}, "plan's file"),
+        ({"schema": 99}, "schema"),
+        ({"domain": "nowhere"}, "nowhere"),
+        ({"number": 999}, "999"),
+        ({"steps": [{"action": "Q"}]}, "'Q'"),
+    ],
+)
+def test_a_plan_that_is_none_is_refused(plan_file, change, said):
+    plan_file.write_text(json.dumps(json.loads(plan_file.read_text()) | change))
+    with pytest.raises(ns.InputError, match=said):
+        Shown.saved(open_source(Query(str(plan_file))).saved)
+
+
+def test_a_domain_or_a_path_and_nothing_else():
+    with pytest.raises(ns.UnknownNameError, match="no file or folder"):
+        open_source(Query("nowhere"))
+    assert open_source(Query("soma")).query.number == 0
+
+
+def test_cells_travel_with_their_plan(tmp_path, capsys):
+    cells = tmp_path / "cells.json"
+    cells.write_text(json.dumps({"a": [[0, 0, 0]], "b": [[0, 0, 1]]}))
+    plan = tmp_path / "plan.json"
+    assert call("plan", "soma", "--cells", cells, "--out", plan) == 0
+    source = open_source(Query(str(plan)))
+    (name,) = source.given
+    assert source.query.domain == name == "plan.json"
+    again = problem_maker(replace(source.query, options=RIGID), source.given)()
+    assert again.actions == ("a", "b")
+    with pytest.raises(ns.InputError, match="options"):
+        problem_maker(replace(source.query, options={"nonsense": 1}), source.given)()
+
+
+# -- the command --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["nowhere", "--export", "x.html"],
+        ["soma", "--problem", "999", "--export", "x.html"],
+        ["soma", "--planner", "none", "--export", "x.html"],
+        ["soma", "--prior", "nothing", "--export", "x.html"],
+        ["soma", "--option", "nonsense=1", "--export", "x.html"],
+        ["soma", "--seconds", "-1", "--export", "x.html"],
+        ["soma", "--export", "x.txt"],
+        ["soma", "--port", "70000"],
+    ],
+    ids=lambda a: " ".join(a[1:-2]) or a[0],
+)
+def test_bad_input_is_refused_before_anything_is_served(arguments, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert call("view", *arguments) == 33
+    assert not list(tmp_path.iterdir())
+    assert "Traceback" not in capsys.readouterr().err
+
+
+def test_without_viser_the_extra_is_named(monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "viser", None)
+    assert call("view", "soma", "--no-browser") == 33
+    assert "neurosym-assembly[viewer]" in capsys.readouterr().err
+
+
+def test_the_model_loads_no_viser():
+    code = (
+        "import sys, neurosym.cli, neurosym.viewer.timeline, neurosym.viewer.facts, neurosym.viewer.solids, "
+        "neurosym.viewer.panels, neurosym.viewer.session, neurosym.viewer.sources; assert 'viser' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+# -- the page -----------------------------------------------------------------------------------------------------
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+ARGUMENTS = [
+    "--no-sandbox", "--use-gl=swiftshader", "--enable-unsafe-swiftshader", "--disable-background-networking"
+]  # fmt: skip
+
+
+#: Software draws every pixel of it.
+SMALL = {"width": 760, "height": 460}
+
+
+@pytest.fixture(scope="module")
+def browser():
+    if CHROMIUM is None:
+        pytest.skip("no Chromium here: apt-get install chromium")
+    api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    with api.sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
+        yield chromium
+        chromium.close()
+
+
+@pytest.fixture(scope="module")
+def viewer():
+    from neurosym.viewer.page import Page
+    from neurosym.viewer.server import LocalServer
+
+    server = LocalServer(label="neurosym")
+    slow = Slow(parts=14, seconds=0.05)
+    page = Page(server, Query("soma", 17, RIGID, "best-first", "random"), {"slow": lambda **options: slow.problem})
+    yield page
+    page.close()
+    server.stop()
+
+
+@pytest.fixture(scope="module")
+def tab(browser, viewer, shown):
+    """The page in a browser, with all that it said on its console and all that it asked for."""
+    viewer.show(shown)
+    tab = browser.new_page(viewport=SMALL)
+    tab.set_default_timeout(25_000)
+    tab.errors, tab.asked = [], []
+    tab.on("console", lambda m: tab.errors.append(m.text) if m.type == "error" else None)
+    tab.on("pageerror", lambda e: tab.errors.append(str(e)))
+    tab.on("request", lambda r: tab.asked.append(r.url))
+    tab.goto(f"http://127.0.0.1:{viewer.server.get_port()}")
+    tab.get_by_text("soma-17").first.wait_for()
+    return tab
+
+
+def until(true, seconds=20.0):
+    end = time.monotonic() + seconds
+    while not true():
+        assert time.monotonic() < end, "it did not happen in time"
+        time.sleep(0.02)
+
+
+def field(tab, label):
+    """The input beside a label. (viser's labels of text fields point nowhere.)"""
+    return tab.locator(f"xpath=//label[.='{label}']/following::input[not(@type='hidden')][1]")
+
+
+def test_the_page_loads_without_errors_and_asks_nobody_else(tab, viewer):
+    tab.locator("canvas").first.wait_for()
+    assert tab.errors == []
+    assert all(u.startswith(("http://127.0.0.1", "data:", "blob:")) for u in tab.asked), tab.asked
+
+
+def test_the_slider_moves_the_right_part(tab, viewer, shown):
+    before = [part.position.copy() for part in viewer.scene.parts]
+    field(tab, "Step").fill("0.5")
+    field(tab, "Step").press("Enter")
+    until(lambda: viewer.slider.value == 0.5)
+    until(lambda: viewer._step_shown == (0, 0))
+    changed = [(old != part.position).any() for old, part in zip(before, viewer.scene.parts)]
+    moved = list(itertools.compress(shown.timeline.names, changed))
+    assert moved == [shown.search.steps[0]]
+    tab.get_by_text("Step 1 of 7").wait_for()
+
+
+def test_play_goes_on_to_the_end_and_starts_over(tab, viewer):
+    viewer.speed.value = "8×"
+    viewer.slider.value = 6.0
+    tab.get_by_role("button", name="Play").click()
+    until(lambda: viewer.slider.value == 7.0)
+    until(lambda: not viewer.playing)
+    tab.get_by_role("button", name="Play").click()
+    until(lambda: viewer.playing and 0.0 < viewer.slider.value < 7.0)
+    tab.get_by_role("button", name="Pause").click()
+    until(lambda: not viewer.playing)
+
+
+def test_a_part_that_is_chosen_tells_its_facts(tab, viewer):
+    viewer.slider.value = 0.0
+    tab.get_by_role("tab", name="Part").click()
+    viewer._picked("T")
+    tab.get_by_text("in the way, by direction").wait_for()
+    opaque = [part.opacity is None for part in viewer.scene.parts]
+    assert Counter(opaque) == {False: 6, True: 1}
+    viewer._picked("(no part)")
+    assert all(part.opacity is None for part in viewer.scene.parts)
+
+
+def test_the_prior_and_the_search_are_there_to_read(tab, viewer, shown):
+    tab.get_by_role("tab", name="Prior").click()
+    tab.locator("svg rect[stroke]").first.wait_for()
+    assert tab.locator("svg rect[stroke]").count() == 7
+    assert tab.locator(".ns img").count() == 4
+    tab.get_by_role("tab", name="Search").click()
+    tab.get_by_text(shown.search.refusals[0].reason).first.wait_for()
+
+
+def test_bad_input_shows_a_message(tab, viewer):
+    tab.get_by_role("tab", name="Plan again").click()
+    for number, said in (("nonsense", "whole number"), ("999", "0 to 239")):
+        field(tab, "Problem").fill(number)
+        until(lambda number=number: viewer.number.value == number)
+        tab.get_by_role("button", name="Plan again").click()
+        tab.get_by_role("alert").get_by_text(said).wait_for()
+    assert "Traceback" not in tab.content()
+    assert viewer.shown.problem.name == "soma-17", "what was shown stays"
+
+
+def test_one_can_plan_again(tab, viewer):
+    tab.get_by_role("tab", name="Plan again").click()
+    field(tab, "Problem").fill("3")
+    until(lambda: viewer.number.value == "3")
+    tab.get_by_role("button", name="Plan again").click()
+    until(lambda: viewer.shown.problem.name == "soma-3")
+    tab.get_by_text("soma-3").first.wait_for()
+    assert viewer.slider.value == 0.0
+    assert len(viewer.scene.parts) == 7
+
+
+def test_stop_ends_a_search(tab, viewer):
+    tab.get_by_role("tab", name="Plan again").click()
+    viewer.domain.value, viewer.options.value, viewer.planner.value = "slow", "", "exhaustive"
+    tab.get_by_role("button", name="Plan again").click()
+    until(lambda: viewer.planning is not None and viewer.planning.progress.attempts > 2)
+    planning = viewer.planning
+    with pytest.raises(ns.InputError, match="one search at a time"):
+        viewer.plan(viewer.query)
+    tab.get_by_role("button", name="Stop").click()
+    assert planning.wait(5)
+    until(lambda: viewer.shown.problem.name == "slow")
+    tab.get_by_text("Stopped").locator("visible=true").first.wait_for()
+    assert tab.errors == []
+
+
+def test_nobody_can_ask_for_a_tunnel(viewer):
+    assert viewer.server.request_share_url() is None
+    assert viewer.server.get_host() == "127.0.0.1"
+
+
+# -- the export ---------------------------------------------------------------------------------------------------
+
+
+def test_the_exported_page_plays_without_server_and_network(browser, plan_file, tmp_path, capsys):
+    page = tmp_path / "out" / "film.html"
+    assert call("view", plan_file, "--export", page) == 0
+    assert [p.name for p in page.parent.iterdir()] == ["film.html"], "no half-written file is left beside it"
+    context = browser.new_context(viewport=SMALL, offline=True)
+    asked, errors = [], []
+    tab = context.new_page()
+    tab.on("request", lambda r: asked.append(r.url))
+    tab.on("console", lambda m: errors.append(m.text) if m.type == "error" else None)
+    tab.on("pageerror", lambda e: errors.append(str(e)))
+    tab.route("**/*", lambda r: r.continue_() if r.request.url.startswith(("file:", "data:", "blob:")) else r.abort())
+    tab.goto(page.as_uri())
+    clock = tab.locator("#root input").first
+    clock.wait_for()
+    first = float(clock.input_value())
+    until(lambda: float(clock.input_value()) > first)
+    tab.locator("#said").get_by_text("A plan was found.").wait_for()
+    assert tab.title() == "soma-17"
+    assert errors == []
+    assert all(url.startswith(("file:", "data:", "blob:")) for url in asked), asked
+    context.close()
+
+
+def test_an_export_that_fails_leaves_nothing(shown, tmp_path):
+    from neurosym.viewer.export import export_page
+
+    with pytest.raises(ns.InputError, match="in space"):
+        export_page(replace(shown, timeline=None, notes=("no parts",)), tmp_path / "x.html")
+    assert not list(tmp_path.iterdir())
