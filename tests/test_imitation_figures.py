@@ -11,6 +11,8 @@ from matplotlib.text import Text
 from PIL import Image
 
 import neurosym as ns
+from neurosym.cli import main
+from neurosym.exit_codes import BAD_INPUT
 from neurosym.findings import findings
 from neurosym.imitation import study, study_names
 from neurosym.imitation_report import report, write_results
@@ -280,3 +282,20 @@ def test_a_page_of_nothing_is_refused(tmp_path):
         write_results_page([tmp_path], tmp_path / "docs" / "results.md")
     with pytest.raises(ns.InputError, match="different names"):
         write_results_page([tmp_path, tmp_path], tmp_path / "results.md")
+
+
+def test_the_command_collects_finished_runs(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit) as left:
+        main(["results"])
+    assert left.value.code == BAD_INPUT
+    write_results(made_up("unseen", sizes=(50,), methods=("sinkhorn",)), tmp_path / "out" / "reproduce-unseen")
+    with pytest.raises(SystemExit) as left:
+        main(["results", "--to", "page.md"])
+    assert left.value.code == 0
+    assert "1 experiment" in capsys.readouterr().err
+    assert "## unseen" in (tmp_path / "page.md").read_text()
+    assert sorted(p.name for p in (tmp_path / "figures").iterdir()) == [
+        "unseen-confusion-hard.png",
+        "unseen-curves-hard.png",
+    ]

@@ -24,4 +24,4 @@ def results(
 
     found = folders or finished_runs(Path("out"))
     write_results_page(found, to)
-    say(f"{to}: {len(found)} experiments")
+    say(f"{to}: {len(found)} experiment{'s' if len(found) > 1 else ''}")
