@@ -85,7 +85,8 @@ class AssemblyFamily(ProblemFamily):
                 and a problem that rests on it is given up, never called unsolvable.
             groups: whether parts may leave together, to be taken apart afterwards, in the hand and without gravity.
             gravity: whether what stays must stand by itself, friction included.
-            held: how many of the parts that stay may be held meanwhile; any, and others at each step.
+            held: how many of the parts that stay may be held meanwhile; any, and others at each step. Without gravity
+                it does not matter.
             fixed: names of parts that stay and need no support, besides those that the assembly itself fixes.
             ground: height of a plane under the parts (z, world), which nothing goes through; True: under the lowest
                 point; False: none; None: under the lowest point (or where the assembly has its table) with gravity,
@@ -105,7 +106,7 @@ class AssemblyFamily(ProblemFamily):
         if len(assembly.fixed) == len(assembly):
             raise InputError(f"Expected a part that is not fixed, to take out; all {len(assembly)} are. Fix fewer.")
         vectors = directions_for(assembly, directions)
-        setting = Setting(tuple(map(tuple, vectors.tolist())), paths, bool(groups), bool(gravity), int(held))
+        setting = Setting(tuple(map(tuple, vectors.tolist())), paths, bool(groups), bool(gravity), int(held) if gravity else 0)
         details = {
             "directions": directions if isinstance(directions, str | int) else vectors.tolist(),
             "ground": assembly.ground if assembly.has_table else None,
@@ -147,8 +148,6 @@ def _check_options(paths: str, groups: bool, gravity: bool, held: int, ground: f
             raise InputError(f"Expected {what} as True or False; got {value!r}.")
     if isinstance(held, bool) or not isinstance(held, int | np.integer) or held < 0:
         raise InputError(f"Expected held as a number of parts, 0 or more; got {held!r}.")
-    if held and not gravity:
-        raise InputError(f"Expected held=0 without gravity, where nothing falls; got {held}.")
     if ground is not None and not (isinstance(ground, int | float | np.number) and np.isfinite(ground)):
         raise InputError(f"Expected ground as a height, True, False or None; got {ground!r}.")
 

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
+from domains.assembly_paths import NoWay, way_out
 from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.blocking import bits
 from neurosym.planner import PlanResult, Status
 from neurosym.predicates import losses
 from neurosym.problem import Rejection
+from neurosym.ways import Way
 from neurosym.why_not import Blocked, Cycle, Fall, WhyNot, blockers_of, smallest_cycle
 
 if TYPE_CHECKING:
@@ -53,11 +55,17 @@ def explain_removal(
     blocked: list[Blocked] = []
     falls: list[Fall] = []
     waiting: list[tuple[str, str]] = []
+    unproved: list[str] = []
     for part in bits(there & ~assembly.fixed_mask):
-        if not graph.free_directions(part, there):
-            blocked += blockers_of(graph, part, there, table=True)
-            continue
         name = assembly.names[part]
+        if not graph.free_directions(part, there):
+            way: Way | NoWay = NoWay("", (), True)
+            if setting.paths == "any":
+                way = way_out(assembly, 1 << part, there, shifting=not setting.gravity)
+            if isinstance(way, NoWay):
+                blocked += blockers_of(graph, part, there, table=True)
+                unproved += [] if way.proved else [name]
+                continue
         waiting += [(name, first) for first, then in before if then == name and first not in done]
         if setting.gravity:
             answer = assembly.stability().standing_when_held(there & ~(1 << part), setting.held)
@@ -71,6 +79,7 @@ def explain_removal(
         cycle=smallest_cycle(graph, kept),
         falls=tuple(falls),
         waiting=tuple(waiting),
+        unproved=tuple(unproved),
     )
 
 
