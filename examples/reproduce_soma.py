@@ -1,0 +1,28 @@
+"""The paper's Table II: a network looks at a Soma cube and says in which order to take it apart; a planner goes on.
+
+It shows on how many unseen cubes each network's own order fails, and how many iterations planners then need. The same
+as `neurosym reproduce soma`; a run that was killed goes on where it was.
+
+    python examples/reproduce_soma.py
+"""
+
+from pathlib import Path
+
+from neurosym.reproduce import Experiment, reproduce, soma_experiment
+
+
+def main(given: Experiment, out: str = "out/reproduce-soma", **options) -> dict[str, float]:
+    records = reproduce(given, Path(out), say=print, **options)
+    failures: dict[str, list[float]] = {}
+    for r in records:
+        if r.metric == "initial_failures":
+            failures.setdefault(f"{r.method}, {r.pictures} pictures", []).append(r.value)
+    shares = {what: sum(values) / len(values) for what, values in failures.items()}
+    for what, share in shares.items():
+        print(f"{what}: the first order fails on {100 * share:.1f}% of the cubes")
+    print(f"{out}: report.md, results.csv and figures")
+    return shares
+
+
+if __name__ == "__main__":
+    main(soma_experiment(), workers=None)  # as many processes as processors
