@@ -71,7 +71,8 @@ def _ours_ahead(results: Results, style: str, metric: str) -> list[str]:
                 zip(results.values(style, study.ours, n, metric), results.values(style, best, n, metric), strict=False)
             )
             won = sum(a > b for a, b in seeds)
-            ahead.append(f"{at}; next is `{best}`, {rivals[best]:.3f}, behind in {won} of {len(seeds)} seeds")
+            in_seeds = f", behind in {won} of {len(seeds)} seeds" if len(seeds) > 1 else ""
+            ahead.append(f"{at}; next is `{best}`, {rivals[best]:.3f}{in_seeds}")
         else:
             level = [f"`{m}`, {v:.3f}" for m, v in rivals.items() if v >= own]
             behind.append(f"{at} against {', '.join(level)}")
