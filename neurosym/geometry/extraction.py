@@ -36,6 +36,9 @@ RANGES: dict[Kind, float] = {"translation": 1.0, "rigid": 0.3}
 #: How far apart OMPL checks a motion, in smallest extents; each new attempt halves it.
 RESOLUTION = 0.05
 
+#: The share of the budget of a search over rigid motions that goes to quarter turns on the lattice, before the trees.
+TURNS_SHARE = 0.25
+
 #: Attempts of a tree, each from a new seed.
 ATTEMPTS = 4
 
@@ -109,7 +112,8 @@ def extract(
             elif proved and kind == "translation":
                 continue
             else:
-                poses = _grown(removal, kind, rng)
+                poses = _turned(removal, max_checks) if kind == "rigid" else None
+                poses = poses or _grown(removal, kind, rng)
         except OutOfBudget:
             poses = None
         if poses is not None:
@@ -128,6 +132,17 @@ def extract(
     names = tuple(assembly.names[p] for p, _ in sorted(met.items(), key=lambda item: (-item[1], item[0])))
     said = "; ".join(reasons)
     return Failure(f"{', '.join(assembly.in_mask(moving))}: {said}.", names, proved, checks)
+
+
+def _turned(removal: Removal, max_checks: int) -> list[Array] | None:
+    """Poses of a way out on the lattice with quarter turns, for a part of the budget; None: none was found."""
+    removal.max_checks = int(TURNS_SHARE * max_checks)
+    try:
+        return Lattice(removal, turns=True).search()
+    except OutOfBudget:
+        return None
+    finally:
+        removal.max_checks = max_checks
 
 
 def _grown(removal: Removal, kind: Kind, rng: np.random.Generator) -> list[Array] | None:

@@ -1,25 +1,31 @@
-"""A lattice of translations whose lines lie where faces come level, searched by A*.
+"""A lattice of translations whose lines lie where faces come level, and quarter turns if wanted, searched by A*.
 
 Offsets along each axis of the moving parts are those at which one of their faces comes level with a face of the
 others, so passages without any play have lattice lines in them. Between boxes with common axes that is complete: the
 free offsets are cut by these planes into boxes, each of them free or not as a whole, and any way through free ones can
 be moved onto their edges. There a search that ends without a way out proves that no translations lead out. For other
 shapes the levels of the commonest corners stand in, filled up by even steps.
+
+With turns, parts may also turn by 90° about their axes, through the middle of any of their bodies: a key in its lock.
+That proves nothing.
 """
 
 from __future__ import annotations
 
 import heapq
-from itertools import pairwise, product
+from bisect import bisect_left, bisect_right
+from itertools import pairwise, permutations, product
 
 import numpy as np
 from numpy.typing import NDArray
 
-from neurosym.geometry.motions import Motion, shifted
+from neurosym.geometry.motions import Motion
 from neurosym.geometry.removal import Removal
 
 Array = NDArray[np.float64]
-Index = tuple[int, int, int]
+
+#: Orientation (a number) and offset along the three axes.
+Node = tuple[int, float, float, float]
 
 #: Levels of corners considered for each side, and offsets along an axis, for parts that are no boxes.
 MAX_LEVELS = 24
@@ -28,24 +34,36 @@ MAX_OFFSETS = 48
 #: Even steps along an axis for parts that are no boxes.
 FILL = 24
 
+#: Poses between the ends of a quarter turn, and bodies through whose middles turns are tried.
+TURN_STEPS = 9
+MAX_PIVOTS = 8
+
 
 class Lattice:
     """The lattice of one removal.
 
     Attributes:
-        offsets: three float64 arrays: translations along the axes of the removal's frame.
         complete: whether no way out on the lattice means that there is none by translations.
     """
 
-    def __init__(self, removal: Removal) -> None:
+    def __init__(self, removal: Removal, *, turns: bool = False) -> None:
         self.removal = removal
-        self.offsets = [self._along(axis) for axis in range(3)]
-        ground = removal.ground is None or bool(np.isclose(np.abs(removal.frame[2]).max(), 1.0, atol=1e-9))
-        self.complete = removal.aligned and ground
-        self._known: dict[tuple[Index, Index], bool] = {}
+        self._frame = removal.frame
+        # Offsets are rounded far below the tolerance, so that the same place reached twice is the same node.
+        self._digits = int(np.ceil(2 - np.log10(removal.assembly.touch)))
+        ground = removal.ground is None or bool(np.isclose(np.abs(self._frame[2]).max(), 1.0, atol=1e-9))
+        self.complete = removal.aligned and ground and not turns
+        self._own = np.concatenate([removal.assembly.body_vertices(i) for i in removal.own_bodies]) - removal.centre
+        self._rotations = [np.eye(3)]
+        self._pivots = np.zeros((0, 3))
+        if turns:
+            self._rotations += [r for r in map(self._in_world, _quarter_turns()) if not np.allclose(r, np.eye(3))]
+            self._pivots = self._middles()
+        self._offsets: dict[int, list[list[float]]] = {}
+        self._known: dict[tuple[Node, Node], bool] = {}
 
     def search(self) -> list[Array] | None:
-        """Poses (4, 4) of a way out, turns only; None: there is none on the lattice.
+        """Poses (4, 4) of a way out, where it bends only; None: there is none on the lattice.
 
         Raises:
             OutOfBudget: the removal's budget ended the search.
@@ -54,26 +72,27 @@ class Lattice:
             way = self._shortest()
             if way is None:
                 return None
-            poses = [shifted(self._offset(index)) for index in _corners(way)]
+            poses = [self._pose(way[0])]
             bad = False
-            # Boxes were answered exactly, edge by edge; other parts only at the ends and some places between.
-            if not self.removal.aligned:
-                for first, second in pairwise(way):
-                    motion = Motion(shifted(self._offset(first)), shifted(self._offset(second)), self.removal.centre)
-                    if not self.removal.is_clear(motion):
-                        self._known[min(first, second), max(first, second)] = False
-                        bad = True
+            for a, b in pairwise(way):
+                leg = self._leg(a, b)
+                # Straight edges between boxes were answered exactly; others only at some places.
+                if not (self.removal.aligned and a[0] == b[0] == 0) and not all(
+                    self.removal.is_clear(Motion(x, y, self.removal.centre)) for x, y in pairwise(leg)
+                ):
+                    self._known[_edge(a, b)] = False
+                    bad = True
+                poses += leg[1:]
             if not bad:
-                return poses
+                return _bends(poses)
 
-    def _shortest(self) -> list[Index] | None:
-        """A* from rest to the first offset that is out; straight on is a little cheaper than round a corner."""
-        x, y, z = (int(np.flatnonzero(o == 0.0)[0]) for o in self.offsets)
-        start: Index = (x, y, z)
-        turn = 1e-3 * self.removal.assembly.smallest_extent
+    def _shortest(self) -> list[Node] | None:
+        """A* from rest to the first node that is out; straight on is a little cheaper than round a corner."""
+        start: Node = (0, 0.0, 0.0, 0.0)
+        corner = 1e-3 * self.removal.assembly.smallest_extent
         best = {start: 0.0}
-        came: dict[Index, Index] = {}
-        queue: list[tuple[float, float, Index, int]] = [(self._left(start), 0.0, start, -1)]
+        came: dict[Node, Node] = {}
+        queue: list[tuple[float, float, Node, int]] = [(self._left(start), 0.0, start, -1)]
         done = set()
         while queue:
             _, cost, at, heading = heapq.heappop(queue)
@@ -86,50 +105,121 @@ class Lattice:
                 while way[-1] in came:
                     way.append(came[way[-1]])
                 return way[::-1]
-            for axis, sign in product(range(3), (1, -1)):
-                place = at[axis] + sign
-                if not 0 <= place < len(self.offsets[axis]):
-                    continue
-                following: Index = (*at[:axis], place, *at[axis + 1 :])  # type: ignore[assignment]
-                if following in done:
-                    continue
-                step = abs(float(self.offsets[axis][place] - self.offsets[axis][at[axis]]))
-                reached = cost + step + (0.0 if heading == axis else turn)
-                if reached >= best.get(following, np.inf) or not self._is_free(at, following):
+            for following, step, axis in self._neighbours(at):
+                reached = cost + step + (0.0 if heading == axis else corner)
+                if following in done or reached >= best.get(following, np.inf) or not self._is_free(at, following):
                     continue
                 best[following], came[following] = reached, at
                 heapq.heappush(queue, (reached + self._left(following), reached, following, axis))
         return None
 
-    def _is_free(self, a: Index, b: Index) -> bool:
-        edge = (min(a, b), max(a, b))
+    def _neighbours(self, at: Node) -> list[tuple[Node, float, int]]:
+        """Nodes one step away, how far that is, and a number for the direction in which they lie."""
+        found: list[tuple[Node, float, int]] = []
+        for axis, levels in enumerate(self._levels(at[0])):
+            here = at[1 + axis]
+            for place in (bisect_left(levels, here) - 1, bisect_right(levels, here)):
+                if 0 <= place < len(levels):
+                    offset = [*at[1:]]
+                    offset[axis] = levels[place]
+                    found.append(((at[0], offset[0], offset[1], offset[2]), abs(levels[place] - here), axis))
+        pose = self._pose(at)
+        for pivot, axis, sign in product(self._pivots, range(3), (1, -1)):
+            turned = self._turned(pose, pivot, axis, sign * np.pi / 2)
+            way = float(np.linalg.norm(self.removal.centre - pivot)) + self.removal.assembly.smallest_extent
+            found.append((self._node(turned), way, 3))
+        return found
+
+    def _is_free(self, a: Node, b: Node) -> bool:
+        edge = _edge(a, b)
         known = self._known.get(edge)
         if known is None:
-            known = self._known[edge] = self._asked(*edge)
+            known = self._known[edge] = self._asked(a, b)
         return known
 
-    def _asked(self, a: Index, b: Index) -> bool:
+    def _asked(self, a: Node, b: Node) -> bool:
         removal = self.removal
-        first, second = self._offset(a), self._offset(b)
-        if removal.aligned:
-            return removal.is_clear(Motion(shifted(first), shifted(second), removal.centre))
-        count = int(np.ceil(np.linalg.norm(second - first) / (0.2 * removal.assembly.smallest_extent)))
-        shares = np.linspace(0.0, 1.0, max(count, 2) + 1)
-        return not any(removal.hit(shifted((1 - s) * first + s * second)) for s in (1.0, *shares[:-1]))
+        if removal.aligned and a[0] == b[0] == 0:
+            return removal.is_clear(Motion(self._pose(a), self._pose(b), removal.centre))
+        if removal.hit(self._pose(b)):
+            return False
+        leg = self._leg(a, b)
+        if len(leg) == 2:
+            motion = Motion(leg[0], leg[1], removal.centre)
+            count = max(int(np.ceil(np.linalg.norm(motion.way) / (0.2 * removal.assembly.smallest_extent))), 2)
+            leg = [motion.at(k / count) for k in range(count + 1)]
+        return not any(removal.hit(X) for X in leg[1:-1])
 
-    def _left(self, index: Index) -> float:
-        return self.removal.left(shifted(self._offset(index)))
+    def _leg(self, a: Node, b: Node) -> list[Array]:
+        """Poses from one node to a neighbour: two, or those of a quarter turn."""
+        first, last = self._pose(a), self._pose(b)
+        if a[0] == b[0]:
+            return [first, last]
+        # The pivot stays in place: it is the fixed point of the turn, up to the turn's axis.
+        turn: Array = last @ np.linalg.inv(first)
+        fixed: Array = np.linalg.pinv(np.eye(3) - turn[:3, :3], rcond=1e-6) @ turn[:3, 3]
+        motion = Motion(np.eye(4), _about(fixed, turn[:3, :3]), fixed)
+        return [first, *(motion.at(k / TURN_STEPS) @ first for k in range(1, TURN_STEPS)), last]
 
-    def _offset(self, index: Index) -> Array:
-        local = np.array([o[i] for o, i in zip(self.offsets, index)])
-        offset: Array = self.removal.frame @ local
-        return offset
+    def _turned(self, pose: Array, pivot: Array, axis: int, angle: float) -> Array:
+        """A pose turned about an axis of the frame through where it has a point (3,) of the assembled parts."""
+        x, y, z = self._frame[:, axis]
+        cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+        R = np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * (cross @ cross)
+        turned: Array = _about(pose[:3, :3] @ pivot + pose[:3, 3], R) @ pose
+        return turned
 
-    def _along(self, axis: int) -> Array:
-        """Offsets along an axis, in order; 0 and one beyond each end are among them."""
+    def _pose(self, node: Node) -> Array:
+        R = self._rotations[node[0]]
+        X = np.eye(4)
+        X[:3, :3] = R
+        X[:3, 3] = self.removal.centre + self._frame @ node[1:] - R @ self.removal.centre
+        return X
+
+    def _node(self, X: Array) -> Node:
+        """The node of a pose that is turned by quarters."""
+        near = [float(np.abs(r - X[:3, :3]).max()) for r in self._rotations]
+        local = self._frame.T @ (X[:3, :3] @ self.removal.centre + X[:3, 3] - self.removal.centre)
+        x, y, z = (round(float(v), self._digits) + 0.0 for v in local)
+        return int(np.argmin(near)), x, y, z
+
+    def _left(self, node: Node) -> float:
+        return self.removal.left(self._pose(node))
+
+    def _in_world(self, local: Array) -> Array:
+        world: Array = self._frame @ local @ self._frame.T
+        return world
+
+    def _middles(self) -> Array:
+        """Points of the moving parts to turn about, float64 (n, 3), each once.
+
+        The middles of the parts and of their largest bodies; and, for bodies that are more than a box, those between
+        the two levels along each axis on which most corners lie, as those of a shaft do.
+        """
+        bounds = self.removal.assembly.body_bounds[self.removal.own_bodies]
+        largest = np.argsort(-np.ptp(bounds, axis=1).max(axis=1), kind="stable")[:MAX_PIVOTS]
+        local = self._own @ self._frame
+        spans = [_commonest(axis, self.removal.assembly.touch)[:2].mean() for axis in local.T]
+        between = np.array(list(product(*((0.0, span) for span in spans)))) @ self._frame.T + self.removal.centre
+        points = np.concatenate([self.removal.centre[None], bounds[largest].mean(axis=1), between])
+        _, first = np.unique(np.round(points, self._digits), axis=0, return_index=True)
+        middles: Array = points[np.sort(first)]
+        return middles
+
+    def _levels(self, orientation: int) -> list[list[float]]:
+        """Offsets along the three axes, in order; 0 and one beyond each end are among them."""
+        known = self._offsets.get(orientation)
+        if known is None:
+            known = self._offsets[orientation] = [self._along(orientation, axis) for axis in range(3)]
+        return known
+
+    def _along(self, orientation: int, axis: int) -> list[float]:
         removal, assembly = self.removal, self.removal.assembly
-        direction = removal.frame[:, axis]
-        own = [assembly.body_vertices(i) @ direction for i in removal.own_bodies]
+        direction = self._frame[:, axis]
+        # Offsets are the centre's: turning back the direction is cheaper than turning the parts.
+        towards = self._rotations[orientation].T @ direction
+        base = float(removal.centre @ (direction - towards))
+        own = [assembly.body_vertices(i) @ towards + base for i in removal.own_bodies]
         others = [assembly.body_vertices(i) @ direction for i in removal.other_bodies]
         low, high = min(o.min() for o in own), max(o.max() for o in own)
         ends = min(o.min() for o in others), max(o.max() for o in others)
@@ -137,17 +227,19 @@ class Lattice:
         start, end = float(ends[0] - high - room), float(ends[1] - low + room)
         must = [0.0, start, end]
         if removal.ground is not None and abs(direction[2]) > 1 - 1e-9:
-            heights = np.concatenate([assembly.body_vertices(i)[:, 2] for i in removal.own_bodies])
-            must.append((removal.ground - float(heights.min())) * float(np.sign(direction[2])))
+            lowest = low if direction[2] > 0 else high
+            must.append(removal.ground * float(np.sign(direction[2])) - float(lowest))
         if removal.aligned:
             own_low, own_high = (np.unique([f(o) for o in own]) for f in (np.min, np.max))
             other_low, other_high = (np.unique([f(o) for o in others]) for f in (np.min, np.max))
             levels = [(other_low[:, None] - own_high).ravel(), (other_high[:, None] - own_low).ravel()]
-            return _merged(np.concatenate(levels), must, start, end, assembly.touch, None)
-        common = [_commonest(np.concatenate(points), assembly.touch) for points in (own, others)]
-        levels = [(common[1][:, None] - common[0]).ravel()]
-        must.extend(np.linspace(start, end, FILL).tolist())
-        return _merged(np.concatenate(levels), must, start, end, assembly.touch, MAX_OFFSETS)
+            found = _merged(np.concatenate(levels), must, start, end, assembly.touch, None)
+        else:
+            common = [_commonest(np.concatenate(points), assembly.touch) for points in (own, others)]
+            must.extend(np.linspace(start, end, FILL).tolist())
+            between = (common[1][:, None] - common[0]).ravel()
+            found = _merged(between, must, start, end, assembly.touch, MAX_OFFSETS)
+        return sorted({round(float(v), self._digits) + 0.0 for v in found})
 
 
 def _merged(levels: Array, must: list[float], start: float, end: float, touch: float, limit: int | None) -> Array:
@@ -172,13 +264,36 @@ def _commonest(levels: Array, touch: float) -> Array:
     return np.array([g.mean() for g in chosen])
 
 
-def _corners(way: list[Index]) -> list[Index]:
-    """A way without the points that lie between two others on one line."""
-    kept = [way[0]]
-    for before, at, after in zip(way, way[1:], way[2:]):
-        step, following = np.subtract(at, before), np.subtract(after, at)
-        if not np.array_equal(step, following):
+def _quarter_turns() -> list[Array]:
+    """The 24 rotations (3, 3) that map the axes onto one another."""
+    found = []
+    for order, signs in product(permutations(range(3)), product((1.0, -1.0), repeat=3)):
+        matrix = np.zeros((3, 3))
+        matrix[range(3), order] = signs
+        if np.linalg.det(matrix) > 0:
+            found.append(matrix)
+    return found
+
+
+def _about(point: Array, R: Array) -> Array:
+    """The rotation R (3, 3) about a point (3,), as a motion (4, 4)."""
+    X = np.eye(4)
+    X[:3, :3] = R
+    X[:3, 3] = point - R @ point
+    return X
+
+
+def _edge(a: Node, b: Node) -> tuple[Node, Node]:
+    return (a, b) if a < b else (b, a)
+
+
+def _bends(poses: list[Array]) -> list[Array]:
+    """Poses without those that lie between two others on one straight line."""
+    kept = [poses[0]]
+    for before, at, after in zip(poses, poses[1:], poses[2:]):
+        step, following = at[:3, 3] - before[:3, 3], after[:3, 3] - at[:3, 3]
+        turns = not np.allclose(before[:3, :3], after[:3, :3], atol=1e-9)
+        across = np.linalg.norm(np.cross(step, following))
+        if turns or across > 1e-9 * np.linalg.norm(step) * np.linalg.norm(following) or step @ following < 0:
             kept.append(at)
-    if len(way) > 1:
-        kept.append(way[-1])
-    return kept
+    return [*kept, poses[-1]] if len(poses) > 1 else kept

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 Array = NDArray[np.float64]
+
+_UNTURNED = np.eye(3)
 
 
 class Motion:
@@ -29,6 +33,7 @@ class Motion:
             self.angle = float(np.linalg.norm(turn))
             x, y, z = turn / max(self.angle, 1e-300)
             self._cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+            self._cross_twice = self._cross @ self._cross
 
     def travel(self, radius: float) -> float:
         """How far a point within `radius` of the centre goes at most (length)."""
@@ -36,12 +41,13 @@ class Motion:
 
     def at(self, share: float) -> Array:
         """The motion of the world, float64 (4, 4), after a share from 0 to 1 of the way."""
-        X = np.eye(4)
-        R = self.first[:3, :3]
-        if self.angle:
-            # Rodrigues' formula.
-            angle, K = share * self.angle, self._cross
-            R = R @ (np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * (K @ K))
+        X = self.first.copy()
+        if not self.angle:
+            X[:3, 3] += share * self.way
+            return X
+        # Rodrigues' formula.
+        angle, K = share * self.angle, self._cross
+        R = self.first[:3, :3] @ (_UNTURNED + math.sin(angle) * K + (1 - math.cos(angle)) * self._cross_twice)
         X[:3, :3] = R
         X[:3, 3] = self._start + share * self.way - R @ self.centre
         return X
