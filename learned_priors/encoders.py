@@ -27,9 +27,11 @@ class Encoder(nn.Module, ABC):
 
     Attributes:
         out_features: length of the feature vector.
+        places_shape: (V, R, C, 3), what `places` gives of each.
     """
 
     out_features: int
+    places_shape: tuple[int, int, int, int]
 
     @abstractmethod
     def prepare(self, pictures: Tensor) -> Tensor:
@@ -38,6 +40,10 @@ class Encoder(nn.Module, ABC):
     @abstractmethod
     def forward(self, prepared: Tensor) -> Tensor:
         """What `prepare` gave -> float (B, out_features)."""
+
+    @abstractmethod
+    def places(self, prepared: Tensor) -> Tensor:
+        """What `prepare` gave -> mean colours of the places of a coarse grid, about -1 to 1: (B, V, R, C, 3)."""
 
 
 class SmallEncoder(Encoder):
@@ -65,6 +71,7 @@ class SmallEncoder(Encoder):
         self.out_features = out_features
         self.down, self.across = max(shape[1] // shape[2], 1), max(shape[2] // shape[1], 1)
         views = shape[0] * self.down * self.across
+        self.places_shape = (views, self.SIDE, self.SIDE, 3)
         self.each = nn.Sequential(nn.Linear(3 * self.SIDE**2, hidden), nn.ReLU(), nn.Linear(hidden, view), nn.ReLU())
         self.all = nn.Sequential(
             nn.Dropout(dropout), nn.Linear(views * view, out_features), nn.ReLU(), nn.Dropout(dropout)
@@ -79,8 +86,23 @@ class SmallEncoder(Encoder):
         features: Tensor = self.all(self.each(prepared).flatten(1))
         return features
 
+    def places(self, prepared: Tensor) -> Tensor:
+        return prepared.reshape(len(prepared), *self.places_shape)
 
-class PaperEncoder(Encoder):
+
+class _Stacked(Encoder):
+    """An encoder of views stacked as channels."""
+
+    def prepare(self, pictures: Tensor) -> Tensor:
+        return _channels(pictures)
+
+    def places(self, prepared: Tensor) -> Tensor:
+        views, rows, columns, _ = self.places_shape
+        pooled = functional.adaptive_avg_pool2d(prepared.to(torch.float32), (rows, columns))
+        return ((pooled - _CENTRE) / _SCALE).reshape(-1, views, 3, rows, columns).permute(0, 1, 3, 4, 2)
+
+
+class PaperEncoder(_Stacked):
     """The convolutional network of Burke et al. (RA-L 2021, appendix), views stacked as channels (12 for Soma).
 
     32, 64, pool, 128, pool, 256, pool (kernels 5 x 5, unpadded, ReLU; pools 2 x 2), dropout 0.5, 128 neurons, ReLU.
@@ -97,6 +119,7 @@ class PaperEncoder(Encoder):
                 f"got {height} x {width}. Use encoder='small', or larger pictures."
             )
         self.out_features = out_features
+        self.places_shape = (views, SmallEncoder.SIDE, SmallEncoder.SIDE, 3)
         self.convolutions = nn.Sequential(
             nn.Conv2d(views * colours, 32, 5),
             nn.ReLU(),
@@ -113,16 +136,13 @@ class PaperEncoder(Encoder):
         left = [(((side - 8) // 2 - 4) // 2 - 4) // 2 for side in (height, width)]
         self.dense = nn.Sequential(nn.Dropout(dropout), nn.Linear(256 * left[0] * left[1], out_features), nn.ReLU())
 
-    def prepare(self, pictures: Tensor) -> Tensor:
-        return _channels(pictures)
-
     def forward(self, prepared: Tensor) -> Tensor:
         x = (prepared.to(torch.float32) - _CENTRE) / _SCALE
         features: Tensor = self.dense(self.convolutions(x).flatten(1))
         return features
 
 
-class ResNetEncoder(Encoder):
+class ResNetEncoder(_Stacked):
     """ResNet18 (He et al., CVPR 2016) of torchvision, untrained, views stacked as channels.
 
     Made for pictures of 224 pixels, it shrinks them 32 times. Here the first strides are left out, the pooling one
@@ -153,6 +173,7 @@ class ResNetEncoder(Encoder):
             )
         network: nn.Module = resnet18(weights=None)
         self.out_features = 512
+        self.places_shape = (views, SmallEncoder.SIDE, SmallEncoder.SIDE, 3)
         pooled, halved = side >= 32 * self.PLACES, side >= 16 * self.PLACES
         kernel, stride = (7, 2) if pooled else (3, 2) if halved else (3, 1)
         network.conv1 = nn.Conv2d(views * colours, 64, kernel, stride, padding=kernel // 2, bias=False)
@@ -160,9 +181,6 @@ class ResNetEncoder(Encoder):
             network.maxpool = nn.Identity()
         network.fc = nn.Identity()
         self.network = network
-
-    def prepare(self, pictures: Tensor) -> Tensor:
-        return _channels(pictures)
 
     def forward(self, prepared: Tensor) -> Tensor:
         features: Tensor = self.network((prepared.to(torch.float32) - _CENTRE) / _SCALE)

@@ -187,23 +187,25 @@ class NetworkPrior(Prior):
         """
         if device is not None:
             self.device = _checked_device(device)
-        train = (config or self.recipe.train).changed(settings or {})
+        views, height, width, colours = demonstrations.pictures.shape[1:]
+        n_steps, n_actions = demonstrations.sequences.shape[1], len(demonstrations.actions)
+        shortest = int(demonstrations.lengths.min())
+        one_view = views == 1 and max(height, width) < 2 * min(height, width)
+        variant = self.recipe.variant(all_actions=shortest == n_actions, one_view=one_view)
+        train = config or self.recipe.train.changed(variant.settings)
+        train = train.changed(settings or {})
         if epochs is not None:
             if epochs < 1:
                 raise InputError(f"Expected at least one epoch; got {epochs}.")
             train = replace(train, epochs=epochs, least_steps=0)
-        views, height, width, colours = demonstrations.pictures.shape[1:]
-        n_steps, n_actions = demonstrations.sequences.shape[1], len(demonstrations.actions)
-        shortest = int(demonstrations.lengths.min())
-        head, neurons = self.recipe.head_for(all_actions=shortest == n_actions)
         network = NetworkConfig(
             encoder=self.encoder or "small",
-            head=head,
+            head=variant.head,
             decoding=self.recipe.decoding,
             picture_shape=(views, height, width, colours),
             n_steps=n_steps,
             n_actions=n_actions,
-            width=neurons,
+            width=variant.width,
             temperature=train.temperature if self.recipe.decoding == "sinkhorn" else 1.0,
             stop=self.recipe.stop if shortest < n_steps else "none",
         )

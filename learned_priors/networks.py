@@ -11,12 +11,13 @@ import torch
 from torch import Tensor, nn
 
 from learned_priors.encoders import PictureShape, build_encoder
+from learned_priors.glimpses import GlimpseHead
 from learned_priors.sinkhorn import TOLERANCE, log_sinkhorn, scaled_sinkhorn
 from learned_priors.stopping import StoppingNetwork, log_length_of_stops
 from learned_priors.tcn import TemporalDecoder
 from neurosym.errors import CheckpointError
 
-Head = Literal["dense", "tcn"]
+Head = Literal["dense", "tcn", "glimpses"]
 Decoding = Literal["sinkhorn", "rows"]
 Stop = Literal["none", "head", "network", "class"]
 
@@ -30,11 +31,12 @@ class NetworkConfig:
 
     Attributes:
         encoder: a name that `build_encoder` knows.
-        head: "dense" (a perceptron) or "tcn" (temporal convolutions).
+        head: "dense" (a perceptron), "tcn" (temporal convolutions) or "glimpses" (looks at one place a step).
         decoding: how logits become log-probabilities: "sinkhorn", or "rows" (a softmax a step).
         picture_shape: (V, H, W, 3).
         n_steps, n_actions: T and N; T < N makes a rectangular head.
-        width: neurons in the dense head's hidden layer, or latent dimensions a step of the temporal one.
+        width: neurons in the hidden layer of the dense head or of the glimpses' reading, or latent dimensions a step of
+            the temporal one.
         temperature: what the order's logits are divided by.
         stop: what tells how many of the T steps a task takes. "none": all of them; "head": a layer on the features of
             the one encoder; "network": a network of its own, with an encoder of its own (the paper's, Sec. IV-B);
@@ -109,9 +111,12 @@ class OrderNetwork(nn.Module):
         self.encoder = build_encoder(config.encoder, config.picture_shape)
         features, steps, actions = self.encoder.out_features, config.n_steps, config.n_actions
         columns = actions + (config.stop == "class")
+        self.looks = config.head == "glimpses"
         self.head: nn.Module
         if config.head == "tcn":
             self.head = TemporalDecoder(features, steps, columns, width=config.width)
+        elif config.head == "glimpses":
+            self.head = GlimpseHead(features, self.encoder.places_shape, steps, columns, width=config.width)
         else:
             self.head = nn.Sequential(
                 nn.Linear(features, config.width),
@@ -131,7 +136,7 @@ class OrderNetwork(nn.Module):
     def forward(self, prepared: Tensor) -> Logits:
         """What `prepare` gave -> logits."""
         features = self.encoder(prepared)
-        table = self.head(features)
+        table = self.head(features, self.encoder.places(prepared)) if self.looks else self.head(features)
         if self.config.stop == "class":
             return Logits(table[..., :-1], stop=table[..., -1])
         if self.config.stop == "head":
