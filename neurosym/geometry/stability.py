@@ -1,43 +1,46 @@
-"""Which subsets of rigid parts stand still under gravity: a linear program on contact patches with friction.
+"""Which subsets of rigid parts stand still under gravity: contact patches with friction.
 
 Forces act at the corners of contact patches, inside linearised Coulomb cones; a subset stands when some choice
-of them balances every part's weight and moments (Fahlman 1974; Livesley 1978). The program is solved with
-slack in its equations: zero slack is equilibrium, and where there is none the dual values are a virtual
-motion in which gravity does work and no contact resists: the evidence, and the parts that move in it.
+of them balances every part's weight and moments (Fahlman 1974; Livesley 1978). Where there is none, a virtual motion
+in which gravity does work and no contact resists proves it: the evidence, and the parts that move in it.
+
+`Equilibrium` decides most questions, and what it cannot prove a linear program decides. In a sequence of questions
+about similar subsets most answers are local, each proved by itself:
+
+* forces of a subset that stood may balance a smaller one as they are, or when only those near what left are changed;
+* parts that fall although all others were immovable fall in any case.
 """
 
 from __future__ import annotations
 
 import functools
+from collections import OrderedDict, deque
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linprog
-from scipy.sparse import csc_array, hstack
 
-from neurosym.errors import NeurosymError
-from neurosym.geometry.assembly import Box
 from neurosym.geometry.blocking import bits
-from neurosym.geometry.contacts import TABLE, Contact, hull_points
-from neurosym.geometry.meshes import signed_volume
+from neurosym.geometry.contacts import TABLE
+from neurosym.geometry.equilibrium import BALANCE, CONE_EDGES, QUICK, THOROUGH, Balance, Equilibrium
+from neurosym.geometry.patches import masses, merged_patches
+from neurosym.geometry.stability_program import solve_program
 
 if TYPE_CHECKING:
     from neurosym.geometry.assembly import Assembly
 
 Array = NDArray[np.float64]
+Numbers = NDArray[np.int64]
 
-#: Edges of the pyramid that stands for a friction cone. Its section has the area of the cone's: friction is exact to
-#: 2% in every direction, and does not prefer the axes of the world.
-CONE_EDGES = 16
-_CONE_RADIUS = float(np.sqrt(2 * np.pi / (CONE_EDGES * np.sin(2 * np.pi / CONE_EDGES))))
+#: Up to so many movable parts a question is answered from scratch: the evidence is the same whatever was asked before.
+SMALL = 48
 
-#: Unbalanced force, as a share of the mean part's weight, below which a subset counts as standing.
-BALANCE = 1e-6
+#: So many subsets that stood are kept with their forces, and so many motions that proved a fall.
+_KEPT_FORCES, _KEPT_FALLS = 12, 400
 
-#: Speed in the virtual motion, as a share of the fastest part's, above which a part counts as moving.
-MOVES = 1e-6
+#: Of the largest residual: from which share on a part counts as moving, from the clearest motion to the faintest.
+_MOVING = (0.3, 3e-2, 1e-3, 1e-6)
 
 
 @dataclass(frozen=True)
@@ -56,6 +59,17 @@ class Standing:
     held: int = 0
 
 
+@dataclass(frozen=True, eq=False)
+class _Question:
+    """Parts that are there, those among them that can move, and the corners between them, as masks and numbers."""
+
+    subset: int
+    movable: int
+    present: NDArray[np.bool_]
+    parts: Numbers
+    corners: Numbers
+
+
 class Stability:
     """Answers `standing(subset)` for an assembly; each subset is solved once and remembered.
 
@@ -64,15 +78,15 @@ class Stability:
         touching: touching[i] is a bitset of the parts in contact with part i.
         on_table: bitset of the parts in contact with the table.
         supports: supports[i] is a bitset of the parts with a contact under part i (normal within 45 degrees).
+        asked: how the questions so far were answered: {"kept", "near", "whole", "program"} -> how many.
     """
 
     def __init__(self, assembly: Assembly) -> None:
         self.assembly = assembly
         n = len(assembly)
-        self._answers: dict[tuple[int, int], Standing] = {}
-        self.masses, self._centres = _masses(assembly)
+        self.masses, self._centres = masses(assembly)
         patches = merged_patches(assembly, assembly.contacts())
-        self.touching, self.supports, self.on_table, self.table_supports = [0] * n, [0] * n, 0, 0
+        self.touching, self.supports, self.on_table = [0] * n, [0] * n, 0
         for p in patches:
             if p.b == TABLE:
                 self.on_table |= 1 << p.a
@@ -83,15 +97,18 @@ class Stability:
                 self.supports[p.a] |= 1 << p.b
             elif p.normal[2] > 0.7:
                 self.supports[p.b] |= 1 << p.a
-        self._patch_bits = [(1 << p.a) | (0 if p.b == TABLE else 1 << p.b) for p in patches]
-        self._assemble(patches)
+        self.equilibrium = Equilibrium(assembly, patches, self.masses, self._centres)
+        self.asked = dict.fromkeys(("kept", "near", "whole", "program"), 0)
+        self._answers: dict[tuple[int, int], Standing] = {}
+        self._forces: OrderedDict[tuple[int, int], Array] = OrderedDict()
+        self._falls: deque[tuple[int, int]] = deque(maxlen=_KEPT_FALLS)
 
     def standing(self, subset: int, held: int = 0) -> Standing:
         """Whether the parts in a bitset stand while those in `held` and the fixed parts cannot move."""
         held &= subset
         answer = self._answers.get((subset, held))
         if answer is None:
-            answer = self._solve(subset, held)
+            answer = self._answer(subset, held)
             if self.assembly.keeps_answers:
                 self._answers[subset, held] = answer
         return answer
@@ -137,123 +154,167 @@ class Stability:
             return Standing(True, 0, found)
         return Standing(False, functools.reduce(int.__or__, motions, 0))
 
-    def _assemble(self, patches: tuple[Contact, ...]) -> None:
-        """The equilibrium matrix of all patches: 6 rows a part, CONE_EDGES columns a patch corner."""
-        mu, scale = self.assembly.friction, self.assembly.smallest_extent
-        rows, columns, values, patch_of = [], [], [], []
-        width = 0
-        for number, p in enumerate(patches):
-            u, v = _patch_axes(p)
-            centre = p.points.mean(axis=0)
-            points = centre + (p.points - centre) * (1 - self.assembly.tolerances.patch_shrink)
-            angles = 2 * np.pi * (np.arange(CONE_EDGES) + 0.5) / CONE_EDGES
-            tangents = np.cos(angles)[:, None] * u + np.sin(angles)[:, None] * v
-            # The force on a: from b to a, that is against the normal.
-            edges = -p.normal + mu * _CONE_RADIUS * tangents
-            forces = np.tile(edges, (len(points), 1))
-            at = np.repeat(points, CONE_EDGES, axis=0)
-            count = len(forces)
-            for part, sign in ((p.a, 1.0), (p.b, -1.0)):
-                if part == TABLE:
-                    continue
-                moments = np.cross(at - self._centres[part], forces) / scale
-                block = sign * np.concatenate([forces, moments], axis=1)  # (count, 6)
-                rows.append(np.tile(6 * part + np.arange(6), count))
-                columns.append(np.repeat(width + np.arange(count), 6))
-                values.append(block.ravel())
-            patch_of.append(np.full(count, number))
-            width += count
-        self._patch_of = np.concatenate(patch_of) if patch_of else np.zeros(0, dtype=int)
-        shape = (6 * len(self.assembly), width)
-        if width:
-            entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
-            self._matrix = csc_array(entries, shape=shape)
-        else:
-            self._matrix = csc_array(shape)
+    def by_program(self, subset: int, held: int = 0) -> Standing:
+        """The same question put to a linear program over all contacts at once: slow, and the last word."""
+        question = self._question(subset, subset & ~held & ~self.assembly.fixed_mask)
+        if not len(question.parts):
+            return Standing(True, 0, held)
+        balance = solve_program(self.equilibrium, question.parts, question.corners, self.assembly.in_mask(subset))
+        return Standing(True, 0, held) if balance.stands else self._fallen(question, balance, held)
 
-    def _solve(self, subset: int, held: int) -> Standing:
-        parts = bits(subset & ~held & ~self.assembly.fixed_mask)
-        if not parts:
+    # -- one question -----------------------------------------------------------------------------------------
+
+    def _question(self, subset: int, movable: int) -> _Question:
+        """All corners between parts that are there, one of them movable at least."""
+        n = len(self.assembly)
+        present, moves = np.zeros(n + 1, dtype=bool), np.zeros(n + 1, dtype=bool)
+        present[bits(subset)] = True
+        present[TABLE] = True
+        moves[bits(movable)] = True
+        whole = self.equilibrium
+        corners = np.flatnonzero(present[whole.a] & present[whole.b] & (moves[whole.a] | moves[whole.b]))
+        return _Question(subset, movable, present, np.flatnonzero(moves[:n]), corners)
+
+    def _answer(self, subset: int, held: int) -> Standing:
+        movable = subset & ~held & ~self.assembly.fixed_mask
+        for known, moving in self._falls:
+            if not moving & ~movable and not subset & ~known:
+                self.asked["kept"] += 1
+                return Standing(False, moving, held)
+        question = self._question(subset, movable)
+        if not len(question.parts):
             return Standing(True, 0, held)
-        present = np.array([(need & subset) == need for need in self._patch_bits], dtype=bool)
-        columns = np.flatnonzero(present[self._patch_of]) if len(self._patch_of) else np.zeros(0, dtype=int)
-        rows = (6 * np.array(parts)[:, None] + np.arange(6)).ravel()
-        matrix = self._matrix[:, columns][rows]
-        weights = np.zeros(len(rows))
-        weights[2::6] = self.masses[parts] / self.masses.mean()
-        # min 1's+ + 1's-  such that  A f + s+ - s- = weight,  f, s >= 0
-        identity = np.arange(len(rows))
-        slack = csc_array((np.ones(len(rows)), (identity, identity)), shape=(len(rows), len(rows)))
-        result = linprog(
-            np.concatenate([np.zeros(len(columns)), np.ones(2 * len(rows))]),
-            A_eq=hstack([matrix, slack, -slack], format="csc"),
-            b_eq=weights,
-            method="highs-ds",
-        )
-        if result.status != 0:
-            raise NeurosymError(
-                f"Expected the stability program of {self.assembly.in_mask(subset)} to have a solution; "
-                f"the solver said: {result.message}. Check the scale of the parts (their units)."
-            )
-        if result.fun <= BALANCE * len(parts):
-            return Standing(True, 0, held)
-        speed = np.abs(result.eqlin.marginals.reshape(-1, 6)).max(axis=1)
-        moving = sum(1 << parts[i] for i in np.flatnonzero(speed > MOVES * speed.max()))
+        start = self._similar(subset, held) if len(question.parts) > SMALL else None
+        if start is not None:
+            answer = self._near(question, start, held)
+            if answer is not None:
+                return answer
+            start = start[question.corners]
+        self.asked["whole"] += 1
+        weights = self.equilibrium.weights[question.parts]
+        balance = self.equilibrium.balance(question.parts, question.corners, weights, start, QUICK[start is not None :])
+        for steps in (THOROUGH, None):
+            if balance.stands:
+                return self._stood(question, balance.forces, held)
+            fallen = self._proved_fall(question, balance)
+            if fallen:
+                return self._fell(subset, fallen, held)
+            if steps is None:
+                break
+            balance = self.equilibrium.balance(question.parts, question.corners, weights, None, steps)
+        self.asked["program"] += 1
+        return self.by_program(subset, held)
+
+    def _similar(self, subset: int, held: int) -> Array | None:
+        """Forces of the most similar subset that stood, float64 (all corners, CONE_EDGES)."""
+        if not self._forces:
+            return None
+        nearest = min(self._forces, key=lambda k: (k[0] ^ subset).bit_count() + (k[1] ^ held).bit_count())
+        self._forces.move_to_end(nearest)
+        return self._forces[nearest]
+
+    def _near(self, question: _Question, start: Array, held: int) -> Standing | None:
+        """An answer from what is near the parts that forces of a similar subset leave unbalanced, if there is one."""
+        whole, n = self.equilibrium, len(self.assembly)
+        weights = whole.weights[question.parts]
+        left = weights - whole.wrenches(question.corners, start[question.corners], n)[question.parts]
+        unbalanced = sum(1 << int(p) for p in question.parts[np.abs(left).max(axis=1) > BALANCE])
+        if not unbalanced:
+            self.asked["kept"] += 1
+            forces = start[question.corners]
+            return self._stood(question, forces, held)
+        # All others immovable: if these parts fall even so, they fall.
+        near = self._question(question.subset, self._with_ring(unbalanced, question.movable))
+        if len(near.parts) < len(question.parts):
+            balance = whole.balance(near.parts, near.corners, whole.weights[near.parts])
+            fallen = self._proved_fall(near, balance) if not balance.stands else 0
+            if fallen:
+                self.asked["near"] += 1
+                return self._fell(question.subset, fallen, held)
+        # All other forces as they are: if those about a path to the ground can be changed to balance, all is balanced.
+        strip = self._with_ring(self._carriers(question, start, unbalanced), question.movable)
+        if 2 * strip.bit_count() < len(question.parts):
+            inner = self._question(question.subset, strip)
+            moves = np.ones(n + 1, dtype=bool)
+            moves[question.parts] = False
+            moves[inner.parts] = True  # True: in the strip, or immovable
+            open_ = moves[whole.a[inner.corners]] & moves[whole.b[inner.corners]]
+            edge, corners = inner.corners[~open_], inner.corners[open_]
+            target = whole.weights[inner.parts] - whole.wrenches(edge, start[edge], n)[inner.parts]
+            balance = whole.balance(inner.parts, corners, target, start[corners], QUICK[1:])
+            if balance.stands:
+                self.asked["near"] += 1
+                forces = start.copy()
+                forces[corners] = balance.forces
+                return self._stood(question, forces[question.corners], held)
+        return None
+
+    def _with_ring(self, parts: int, among: int) -> int:
+        """Parts, and those that touch them."""
+        touching = functools.reduce(int.__or__, (self.touching[p] for p in bits(parts)), parts)
+        return touching & among
+
+    def _carriers(self, question: _Question, forces: Array, parts: int) -> int:
+        """Parts, and those that carry most of each of them, down to the ground or to what cannot move."""
+        whole = self.equilibrium
+        at = question.corners
+        lift = np.einsum("ke,ke->k", whole.lift[at], forces[at])
+        patch, first = np.unique(whole.patch[at], return_index=True)
+        lift = np.add.reduceat(lift, first) if len(first) else lift
+        del patch
+        a, b = whole.a[at[first]], whole.b[at[first]]
+        down = lift > 0
+        upper, lower = np.where(down, a, b), np.where(down, b, a)
+        best: dict[int, int] = {}
+        for k in np.argsort(np.abs(lift)):
+            best[int(upper[k])] = int(lower[k])
+        found = parts
+        waiting = bits(parts)
+        while waiting:
+            lower_part = best.get(waiting.pop(), TABLE)
+            if lower_part != TABLE and question.movable >> lower_part & 1 and not found >> lower_part & 1:
+                found |= 1 << lower_part
+                waiting.append(lower_part)
+        return found
+
+    # -- proofs -----------------------------------------------------------------------------------------------
+
+    def _stood(self, question: _Question, forces: Array, held: int) -> Standing:
+        if len(question.parts) > SMALL:
+            kept = np.zeros((len(self.equilibrium.a), CONE_EDGES))
+            kept[question.corners] = forces
+            self._forces[question.subset, held] = kept
+            if len(self._forces) > _KEPT_FORCES:
+                self._forces.popitem(last=False)
+        return Standing(True, 0, held)
+
+    def _fell(self, subset: int, moving: int, held: int) -> Standing:
+        if self.assembly.keeps_answers:
+            self._falls.append((subset, moving))
         return Standing(False, moving, held)
 
+    def _proved_fall(self, question: _Question, balance: Balance) -> int:
+        """A bitset of parts that fall even if all others cannot move; 0 where that cannot be proved.
 
-def _patch_axes(patch: Contact) -> tuple[Array, Array]:
-    """Tangents (3,) of a patch along and across its longest edge: the cone turns with the parts, not with the world."""
-    following = np.roll(patch.points, -1, axis=0) - patch.points
-    u = following[np.argmax(np.linalg.norm(following, axis=1))]
-    u = u - (u @ patch.normal) * patch.normal
-    u = u / np.linalg.norm(u)
-    return u, np.cross(patch.normal, u)
-
-
-def merged_patches(assembly: Assembly, contacts: tuple[Contact, ...]) -> tuple[Contact, ...]:
-    """Contacts between parts, those in one plane merged into the convex hull of their corners; a, b are parts.
-
-    For rigid parts nothing is lost: a force anywhere in the hull with a cone's direction is a sum of such
-    forces at its corners.
-    """
-    owners, touch = assembly.owners, assembly.touch
-    groups: dict[tuple[int, int], list[tuple[Array, float, list[Array], float]]] = {}
-    for c in contacts:
-        a, b = int(owners[c.a]), TABLE if c.b == TABLE else int(owners[c.b])
-        normal = c.normal
-        if b != TABLE and a > b:
-            a, b, normal = b, a, -normal
-        offset = float(c.points.mean(axis=0) @ normal)
-        planes = groups.setdefault((a, b), [])
-        for k, (known, distance, points, area) in enumerate(planes):
-            if known @ normal > 1 - 1e-6 and abs(distance - offset) <= 2 * touch:
-                planes[k] = (known, distance, [*points, c.points], area + c.area)
+        The parts with most of the residual are asked about by themselves, then more of them.
+        """
+        speed = np.abs(balance.residual).max(axis=1)
+        before = 0
+        for share in _MOVING:
+            parts = question.parts[speed >= share * speed.max()]
+            mask = sum(1 << int(p) for p in parts)
+            if mask == before:
+                continue
+            before = mask
+            inner = self._question(question.subset, mask)
+            if len(inner.parts) == len(question.parts):
                 break
-        else:
-            planes.append((normal, offset, [c.points], c.area))
-    found = []
-    for (a, b), planes in groups.items():
-        for normal, _, points, area in planes:
-            corners = points[0] if len(points) == 1 else hull_points(np.concatenate(points), normal)
-            found.append(Contact(a, b, corners, normal, area))
-    return tuple(found)
+            weights = self.equilibrium.weights[inner.parts]
+            steps = THOROUGH if len(inner.parts) <= SMALL else QUICK
+            if self.equilibrium.balance(inner.parts, inner.corners, weights, None, steps).stands is False:
+                return mask
+        return sum(1 << int(p) for p in question.parts) if balance.stands is False else 0
 
-
-def _masses(assembly: Assembly) -> tuple[Array, Array]:
-    """Masses (n,) and centres of mass (n, 3), in the world, of the parts."""
-    volumes, moments = np.zeros(len(assembly)), np.zeros((len(assembly), 3))
-    for i, body in enumerate(assembly.bodies):
-        owner = assembly.owners[i]
-        if isinstance(body.shape, Box):
-            volume, centre = float(np.prod(body.shape.size)), assembly.X_WB[i][:3, 3]
-        else:
-            vertices, faces = assembly.body_vertices(i), body.shape.faces
-            volume = signed_volume(vertices, faces)
-            a, b, c = (vertices[faces[:, k]] - vertices[0] for k in range(3))
-            each = np.einsum("nd,nd->n", a, np.cross(b, c)) / 6
-            centre = vertices[0] + (each[:, None] * (a + b + c)).sum(axis=0) / (4 * volume)
-        volumes[owner] += volume
-        moments[owner] += volume * centre
-    densities = np.array([p.density for p in assembly.parts])
-    return volumes * densities, moments / volumes[:, None]
+    def _fallen(self, question: _Question, balance: Balance, held: int) -> Standing:
+        moving = self._proved_fall(question, balance)
+        return Standing(False, moving or sum(1 << int(p) for p in question.parts), held)
