@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import sys
+from contextlib import redirect_stdout
 from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
@@ -75,12 +77,14 @@ def reproduce(
 
     folder = out or Path("out") / f"reproduce-{name}{'' if scale is Scale.quick else f'-{scale.value}'}"
     where = {"workers": workers, "engine": engine.value, "address": address}
-    if name in study_names():
-        page = _study(name, scale, seeds, prior, epochs, where, folder)
-    elif name == "soma":
-        page = _planning(scale, seeds, pictures, prior, epochs, repeats, where, folder)
-    else:
+    if name != "soma" and name not in study_names():
         raise UnknownNameError("experiment", name, ["soma", *study_names()])
+    # Ray says on stdout that a node is lost; stdout belongs to the answer.
+    with redirect_stdout(sys.stderr):
+        if name == "soma":
+            page = _planning(scale, seeds, pictures, prior, epochs, repeats, where, folder)
+        else:
+            page = _study(name, scale, seeds, prior, epochs, where, folder)
     print(page)  # a table of Markdown: rendered, its columns would not fit a terminal
     say(f"{folder}: results.csv, report.md and figures")
 
