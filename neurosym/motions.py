@@ -110,7 +110,8 @@ def stage(problem: Problem, plan: Sequence[str], how: Sequence[Any] = ()) -> Sta
     """The motions of a plan.
 
     The problem says itself what its actions do to parts (`Problem.stage`), or a step's `Way` does, or the problem's
-    `Simulation`; failing these, an action that bears the name of a part takes that part away.
+    `Simulation`; failing these, the effects do: an action takes away the parts about which it only deletes atoms, and
+    brings those about which it only adds some.
 
     Args:
         problem: what was planned.
@@ -131,20 +132,54 @@ def stage(problem: Problem, plan: Sequence[str], how: Sequence[Any] = ()) -> Sta
         return problem.stage(plan, how)
     world = problem.world
     simulation = problem.simulation
-    named = {name: name for name in problem.actions if isinstance(world, Assembly) and name in world.index}
-    removes = named if simulation is None else simulation.removes
+    if simulation is None and isinstance(world, Assembly):
+        return _by_effects(problem, world, plan, how)
+    removes = {} if simulation is None else simulation.removes
     parts = [_parts_of(how[i] if how else None, name, removes) for i, name in enumerate(plan)]
     if not isinstance(world, Assembly) or not all(parts):
-        raise InputError(
-            f"Expected a problem that says what its actions do to parts in space; {problem.name!r} does not. Give "
-            "Domain.problem a world that is an Assembly and simulation=Simulation('rigid', removes={action: part}), or "
-            "a function as stage=."
-        )
+        raise _unclear(problem)
     # A plan that puts together begins with what it does not bring.
     arriving = {n for i, names in enumerate(parts) if _arrives(how[i] if how else None) for n in names}
     absent = arriving.union(() if simulation is None else simulation.absent)
     present = tuple(n for n in world.names if n not in absent)
     return Staging(world, present, steps_in_space(world, present, plan, parts, how))
+
+
+def _unclear(problem: Problem) -> InputError:
+    return InputError(
+        f"Expected a problem that says what its actions do to parts in space; {problem.name!r} does not. Give "
+        "Domain.problem a world that is an Assembly and simulation=Simulation('rigid', removes={action: part}), or "
+        "a function as stage=."
+    )
+
+
+def _by_effects(problem: Problem, world: Assembly, plan: Sequence[str], how: Sequence[Any]) -> Staging:
+    """The staging of a problem that says nothing of space but what its actions add and delete."""
+    leaves, comes, absent = {}, {}, set()
+    for action in problem.domain.actions:
+        for binding in problem.bindings(action):
+            effects = [e.bind(binding) for e in action.eff]
+            gone = {n for e in effects if not e.positive for n in e.atom.args}
+            come = {n for e in effects if e.positive for n in e.atom.args}
+            name = action.ground_name(binding)
+            leaves[name] = tuple(n for n in world.names if n in gone - come)
+            comes[name] = tuple(n for n in world.names if n in come - gone)
+            lacking = {n for e in effects if not e.positive and e.atom not in problem.init for n in e.atom.args}
+            absent |= lacking.intersection(leaves[name])
+    parts, ways = [], []
+    for i, name in enumerate(plan):
+        given = how[i] if how else None
+        moving = _parts_of(given, name, {}) or leaves[name] or comes[name]
+        if not moving:
+            raise _unclear(problem)
+        if not leaves[name] and not isinstance(given, Way):
+            out = None if given is None else np.negative(np.asarray(given, dtype=np.float64)).tolist()
+            given = Way(moving, out, arrives=True)
+        absent |= set(moving) if _arrives(given) else set()
+        parts.append(moving)
+        ways.append(given)
+    present = tuple(n for n in world.names if n not in absent)
+    return Staging(world, present, steps_in_space(world, present, plan, parts, ways))
 
 
 def steps_in_space(

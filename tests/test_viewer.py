@@ -156,6 +156,34 @@ def test_tiles_are_laid_flat_with_their_faces_up():
     assert (np.diff(positions[:, 0]) > 1).all()
 
 
+@pytest.mark.parametrize("building", [False, True])
+def test_effects_say_what_leaves_and_what_comes(building):
+    part = ns.Type("part")
+    present, painted, plain = (ns.Fluent(name, part) for name in ("present", "painted", "plain"))
+    p = part("p")
+    world = ns.Assembly.from_cells({"low": [(0, 0, 0)], "high": [(0, 0, 1)], "aside": [(3, 0, 0)]})
+    effect = present(p) if building else ~present(p)
+    paint = ns.Action("paint", p, pre=[plain(p)], eff=[painted(p), ~plain(p)])
+    move = ns.Action("move", p, pre=[~effect, ns.predicates.free(present)(p)], eff=[effect])
+    init = [*(plain(n) for n in world.names), *(present(n) for n in world.names if not building or n == "aside")]
+    goal = [present("low"), present("high")] if building else [~present(n) for n in world.names]
+
+    def problem_with(action):
+        domain = ns.Domain("d", fluents=[present, painted, plain], actions=[action])
+        return domain.problem(world=world, objects={part: world.names}, init=init, goal=goal if action is move else [])
+
+    problem = problem_with(move)
+    result = ns.solve(problem)
+    staging = stage(problem, result.plan, result.how)
+    assert {m.arrives for m in staging.motions} == {building}
+    assert staging.present == (("aside",) if building else world.names)
+    assert all(m.parts[0] in m.action and m.given for m in staging.motions)
+    film = Timeline(staging)
+    assert (film.where[-1] == (IN_PLACE if building else APART)).all()
+    with pytest.raises(ns.InputError, match="in space"):
+        stage(problem_with(paint), ["paint(low)"])
+
+
 def test_a_group_is_set_down_as_one_and_taken_apart_there():
     cells = {"base": [(0, 0, 0)], "a": [(0, 0, 1)], "b": [(0, 0, 2)]}
     world = ns.Assembly.from_cells(cells)

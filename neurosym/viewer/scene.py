@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import colorsys
 import itertools
 from collections.abc import Callable
 from typing import Any
@@ -10,7 +11,7 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
-from neurosym.simulation.scene import palette_colour
+from neurosym.simulation.scene import PALETTE, palette_colour
 from neurosym.viewer.solids import solids
 from neurosym.viewer.timeline import Timeline, floor_of
 
@@ -32,12 +33,26 @@ FIELD_OF_VIEW, FROM, MARGIN = 0.7, np.array([0.35, -0.75, 0.56]), 1.05
 #: Turns a picture, which faces along -z with its top at -y, so that it lies face up with its top at +y.
 _UPWARD = (0.0, 1.0, 0.0, 0.0)
 
+#: Colour of parts that never move, RGB in 0..1.
+FIXED = (0.55, 0.55, 0.53)
+
 _EDGE, _PICKED = (45, 45, 45), (213, 94, 0)
 
 
 def named_at_first(timeline: Timeline | None) -> bool:
     """Whether parts bear their names before anybody asks: where they are few, and no picture says what they are."""
     return timeline is not None and len(timeline.names) <= MOST_NAMES and not timeline.staging.tops
+
+
+def part_colour(number: int, of: int) -> tuple[float, float, float]:
+    """The colour of a part without one of its own, RGB in 0..1: as in pictures while the palette has enough of them.
+
+    Lighter and darker turns of the palette end in white and black; many parts go round the colour circle instead, each
+    a golden angle from the last.
+    """
+    if of <= 3 * len(PALETTE):
+        return palette_colour(number)
+    return colorsys.hsv_to_rgb(0.618034 * number % 1.0, (0.5, 0.62, 0.38)[number % 3], (0.9, 0.74, 0.98)[number % 3])
 
 
 class PlanScene:
@@ -54,7 +69,7 @@ class PlanScene:
         self.parts: list[viser.MeshHandle] = []
         self._on_pick = on_pick
         self._names: list[viser.LabelHandle] = []
-        self._outlines: list[viser.LineSegmentsHandle] = []
+        self._outlines: dict[str, viser.LineSegmentsHandle] = {}
         self._way: viser.LineSegmentsHandle | None = None
         self._way_of: int | None = None
         self._picked: str | None = None
@@ -66,7 +81,7 @@ class PlanScene:
         with self.server.atomic():
             self.server.scene.remove_by_name("/work")
             self.timeline, self._picked, self._way, self._way_of = timeline, None, None, None
-            self.parts, self._names, self._outlines = [], [], []
+            self.parts, self._names, self._outlines = [], [], {}
             if timeline is not None:
                 self._add(timeline)
                 self.show(0.0)
@@ -77,10 +92,11 @@ class PlanScene:
         self._sent = np.full((len(assembly), 8), np.nan)
         self.scale = SIZE / float((high - low).max())
         self.origin = np.array([*(low[:2] + high[:2]) / 2, floor_of(assembly)])
-        thick = 0.0035 * SIZE
+        thick = 0.0035 * SIZE * min(1.0, 6.0 / len(assembly) ** 0.5)
         for i, solid in enumerate(solids(assembly)):
             name = assembly.names[i]
-            colour = timeline.staging.colours.get(name, palette_colour(i))
+            own = FIXED if name in assembly.fixed else part_colour(i, len(assembly))
+            colour = timeline.staging.colours.get(name, own)
             middle = timeline.centres[i]
             node = scene.add_mesh_simple(
                 f"/work/{i}",
@@ -91,10 +107,7 @@ class PlanScene:
             )
             outline = (solid.outline - middle) * self.scale
             if len(outline):
-                edges = scene.add_line_segments(
-                    f"/work/{i}/edges", outline, _EDGE, thickness=thick * min(1.0, 6.0 / len(assembly) ** 0.5)
-                )
-                self._outlines.append(edges)
+                self._outlines[name] = scene.add_line_segments(f"/work/{i}/edges", outline, _EDGE, thickness=thick)
             if name in timeline.staging.tops:
                 size = np.ptp(timeline.bounds_at_rest[i], axis=0) * self.scale
                 scene.add_image(
@@ -205,6 +218,9 @@ class PlanScene:
         with self.server.atomic():
             for own, node in zip(timeline.names, self.parts):
                 node.opacity = None if name is None or own == name else FAINT
+            for own, edges in self._outlines.items():
+                # Of few parts the outlines say what is where; of many they would hide the one.
+                edges.visible = name is None or own == name or len(self.parts) <= MOST_NAMES
 
     def name_parts(self, visible: bool) -> None:
         """Show or hide the parts' names."""
