@@ -27,7 +27,7 @@ def test_each_has_demonstrations_enough_and_settings_that_exist(name, scale):
     assert set(given.train) <= set(given.methods)
     for n in given.sizes:
         for part, options in (("train", given.options(n)), (given.part, given.test(n))):
-            own = {k: v for k, v in options.items() if k != "count"}
+            own = taken_by(family.numbers, options)
             numbers = family.numbers(part, split=given.seeds - 1, **own)
             assert options.get("count", 1) <= len(numbers)
     if scale == "quick":
