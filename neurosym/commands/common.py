@@ -109,7 +109,10 @@ def progress_bar(what: str) -> Iterator[Progress]:
 
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     err = Console(stderr=True)
-    with Bars(*columns, console=err, transient=True, disable=not err.is_terminal) as bars:
+    # The time left is judged by the last hour: a training may take minutes.
+    with Bars(
+        *columns, console=err, transient=True, disable=not err.is_terminal, speed_estimate_period=3600
+    ) as bars:
         task = bars.add_task(what, total=None)
         yield lambda done, total: bars.update(task, completed=done, total=total)
 
