@@ -8,14 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from neurosym.errors import InputError
 from neurosym.geometry.directions import in_words
-from neurosym.geometry.paths import Path
+
+if TYPE_CHECKING:
+    from neurosym.geometry.paths import Path
 
 Vector = tuple[float, float, float]
 
@@ -90,6 +92,8 @@ class Way:
         Raises:
             InputError: something else.
         """
+        from neurosym.geometry.paths import Path  # loads FCL
+
         try:
             names, held = tuple(map(str, said["parts"])), tuple(map(str, said.get("held", ())))
             path = None if said.get("path") is None else Path.from_json(said["path"])
