@@ -633,8 +633,12 @@ ARGUMENTS = [
 ]  # fmt: skip
 
 
-#: Software draws every pixel of it.
-SMALL = {"width": 760, "height": 460}
+#: Software draws every pixel of it: a small window, and a frame or two a second, leave the processor to the tests.
+SMALL = {"width": 760, "height": 420}
+SELDOM = """
+window.requestAnimationFrame = (draw) => setTimeout(() => draw(performance.now()), 600);
+window.cancelAnimationFrame = (id) => clearTimeout(id);
+"""
 
 
 @pytest.fixture(scope="module")
@@ -666,7 +670,8 @@ def tab(browser, viewer, shown):
     """The page in a browser, with all that it said on its console and all that it asked for."""
     viewer.show(shown)
     tab = browser.new_page(viewport=SMALL)
-    tab.set_default_timeout(25_000)
+    tab.set_default_timeout(60_000)
+    tab.add_init_script(SELDOM)
     tab.errors, tab.asked = [], []
     tab.on("console", lambda m: tab.errors.append(m.text) if m.type == "error" else None)
     tab.on("pageerror", lambda e: tab.errors.append(str(e)))
@@ -676,7 +681,7 @@ def tab(browser, viewer, shown):
     return tab
 
 
-def until(true, seconds=20.0):
+def until(true, seconds=60.0):
     end = time.monotonic() + seconds
     while not true():
         assert time.monotonic() < end, "it did not happen in time"
@@ -790,6 +795,8 @@ def test_the_exported_page_plays_without_server_and_network(browser, plan_file, 
     context = browser.new_context(viewport=SMALL, offline=True)
     asked, errors = [], []
     tab = context.new_page()
+    tab.set_default_timeout(60_000)
+    tab.add_init_script(SELDOM)
     tab.on("request", lambda r: asked.append(r.url))
     tab.on("console", lambda m: errors.append(m.text) if m.type == "error" else None)
     tab.on("pageerror", lambda e: errors.append(str(e)))
