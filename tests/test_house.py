@@ -12,7 +12,7 @@ import neurosym
 
 ROOT = Path(__file__).parent.parent
 PYPROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
-HEAVY = ("fcl", "ompl", "torch", "pybullet", "matplotlib")
+HEAVY = ("fcl", "ompl", "torch", "pybullet", "matplotlib", "viser")
 
 
 def loaded_by(code: str) -> set[str]:
