@@ -172,7 +172,7 @@ def test_a_study_on_ray_loses_a_node_and_gives_the_whole_table(cluster, tmp_path
     def lose_the_second_node(finished, total):
         done.append(finished)
         if finished == 2:
-            for _ in range(2000):
+            for _ in range(9000):
                 if (tmp_path / "the second node is at work").exists():
                     break
                 time.sleep(0.01)
