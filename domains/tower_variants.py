@@ -12,6 +12,7 @@ import itertools
 from functools import cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from domains.tower_blocks import COLOURS, Block
 from neurosym.errors import InputError, UnknownNameError
@@ -24,7 +25,7 @@ DIVIDED = ("tower", "sequence")
 #: Two thirds to train, as in the paper (200 of 300).
 TRAIN_SHARE = 2 / 3
 #: Kept apart from any user's seed, so that a split never repeats the draws of a search.
-_SPLIT_STREAM = 0x54_57_52
+_SPLIT_STREAM, _ORDER_STREAM = 0x54_57_52, 0x54_57_53
 
 _PAIRED = tuple(Block(f"{colour}-{i}", colour) for colour in ("red", "yellow", "blue") for i in (1, 2))
 _UNIQUE = tuple(Block(colour, colour) for colour in COLOURS)
@@ -73,7 +74,7 @@ def split_numbers(variant: str, part: str, split: int, by: str) -> tuple[int, ..
     """Numbers of the towers of a part, ``"train"``, ``"test"`` or ``"all"``, in random order ("all" in their own).
 
     Args:
-        split: which random split.
+        split: which random split. A tower of `heights` that is one of `colours` too is in the same part of both.
         by: ``"tower"`` deals out towers, ``"sequence"`` colour sequences with all their towers.
 
     Raises:
@@ -89,15 +90,31 @@ def split_numbers(variant: str, part: str, split: int, by: str) -> tuple[int, ..
     total = len(towers(variant))
     if part == "all":
         return tuple(range(total))
-    rng = np.random.default_rng([_SPLIT_STREAM, VARIANTS.index(variant), DIVIDED.index(by), split])
+    to_train = _trains(variant, split, by)
+    rng = np.random.default_rng([_ORDER_STREAM, VARIANTS.index(variant), DIVIDED.index(by), split])
     order = rng.permutation(total)
-    if by == "tower":
-        cut = round(TRAIN_SHARE * total)
-        chosen = order[:cut] if part == "train" else order[cut:]
-    else:
-        groups = rng.permutation(len(sequences(variant)))
-        to_train = np.zeros(len(groups), dtype=bool)
-        to_train[groups[: round(TRAIN_SHARE * len(groups))]] = True
-        of_train = to_train[np.array(sequence_numbers(variant))[order]]
-        chosen = order[of_train] if part == "train" else order[~of_train]
+    chosen = order[to_train[order] == (part == "train")]
     return tuple(int(n) for n in chosen)
+
+
+@cache
+def _trains(variant: str, split: int, by: str) -> NDArray[np.bool_]:
+    """bool (n_towers,): which towers are to train.
+
+    The towers of six levels among ``heights`` are those of ``colours``, and go where these go: what was trained on the
+    one is tested on the other without having seen it.
+    """
+    known = towers(variant)
+    ids = np.array(sequence_numbers(variant)) if by == "sequence" else np.arange(len(known))
+    divided = np.full(ids.max() + 1, False)
+    free = np.arange(len(divided))
+    if variant == "heights":
+        tall = np.array([len(tower) == TALLEST for tower in known])
+        # In the same order: towers and sequences alike are listed lower ones first, then as `colours` lists them.
+        like = _trains("colours", split, by)
+        divided[ids[tall]] = like
+        free = np.unique(ids[~tall])
+    rng = np.random.default_rng([_SPLIT_STREAM, VARIANTS.index(variant), DIVIDED.index(by), split])
+    divided[rng.permutation(free)[: round(TRAIN_SHARE * len(free))]] = True
+    found: NDArray[np.bool_] = divided[ids]
+    return found

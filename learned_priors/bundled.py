@@ -1,6 +1,7 @@
 """The weights that come with the package: which file answers for a problem, or for pictures alone.
 
-Files are named ``{domain}-{prior}.safetensors``; their headers say the rest.
+Files are named ``{domain}-{prior}.safetensors``, or ``{domain}-{kind}-{prior}`` where one network does not serve all of
+a domain's problems; their headers say the rest.
 """
 
 from __future__ import annotations
@@ -16,15 +17,15 @@ FOLDER = Path(__file__).parent / "weights"
 
 
 def files(prior: str, folder: Path | None = None) -> dict[str, Path]:
-    """Domain -> bundled weights file, for a prior."""
+    """Name -> bundled weights file, for a prior: the name of a domain, or of one kind of its problems."""
     ending = f"-{prior}.safetensors"
-    # A prior's name may end in another's, so the domain is what the header says, not what is left of the name.
-    found = {path: read_header(path) for path in sorted((folder or FOLDER).glob(f"*{ending}"))}
-    return {str(header["domain"]): path for path, header in found.items() if header.get("prior") == prior}
+    found = {path.name.removesuffix(ending): path for path in sorted((folder or FOLDER).glob(f"*{ending}"))}
+    # A prior's name may end in another's: the header says which it is.
+    return {name: path for name, path in found.items() if read_header(path).get("prior") == prior}
 
 
 def for_domain(prior: str, domain: str, folder: Path | None = None) -> Path:
-    """The file of that domain."""
+    """The file of that name, for instance ``soma`` or ``tower-unique``."""
     known = files(prior, folder)
     if domain not in known:
         raise InputError(_none_fits(prior, known, f"the domain {domain!r}"))
@@ -32,12 +33,14 @@ def for_domain(prior: str, domain: str, folder: Path | None = None) -> Path:
 
 
 def for_actions(prior: str, family: str | None, actions: Sequence[str], folder: Path | None = None) -> Path:
-    """The file of the problem's family; where there is none, the one that knows all of these actions."""
+    """The file that knows all of these actions: of the problem's family if that has any, otherwise of any."""
     known = files(prior, folder)
-    if family in known:
-        return known[family]
+    of_family = [path for path in known.values() if read_header(path).get("domain") == family]
     fit = [path for path in known.values() if set(actions) <= set(read_header(path).get("actions", ()))]
-    return _only(fit, prior, known, f"a problem of the family {family!r} with the actions {', '.join(actions)}")
+    own = [path for path in fit if path in of_family]
+    # The family's only file answers even where it does not know the actions: it then says which it knows.
+    chosen = own or (of_family if len(of_family) == 1 else fit)
+    return _only(chosen, prior, known, f"a problem of the family {family!r} with the actions {', '.join(actions)}")
 
 
 def for_pictures(prior: str, shape: Sequence[int], folder: Path | None = None) -> Path:

@@ -197,7 +197,7 @@ class NetworkPrior(Prior):
         if epochs is not None:
             if epochs < 1:
                 raise InputError(f"Expected at least one epoch; got {epochs}.")
-            train = replace(train, epochs=epochs, least_steps=0)
+            train = replace(train, epochs=epochs, least_steps=0, most_steps=None)
         network = NetworkConfig(
             encoder=self.encoder or "small",
             head=variant.head,

@@ -87,7 +87,10 @@ def fit(
         raise InputError(f"Expected {len(demonstrations.actions)} classes, one an action; got {len(config.classes)}.")
     learn, held = _split(demonstrations, config.held_out, seed)
     steps_per_epoch = math.ceil(len(learn) / config.batch)
-    epochs = max(config.epochs, math.ceil(config.least_steps / steps_per_epoch))
+    epochs = config.epochs
+    if config.most_steps is not None:
+        epochs = max(1, min(epochs, config.most_steps // steps_per_epoch))
+    epochs = max(epochs, math.ceil(config.least_steps / steps_per_epoch))
     run = Learner(demonstrations, network, config, seed, torch.device(device), steps_per_epoch * epochs)
     state = RunState()
     mark = fingerprint(demonstrations, network, config, seed) if checkpoint else ""

@@ -87,7 +87,7 @@ def train(
     with warnings.catch_warnings():
         warnings.showwarning = lambda message, *_, **__: say(f"Note: {message}")
         _fit(learner, given, seed=seed, epochs=epochs, device=device, checkpoint=checkpoint, resume=resume)
-    made_here = {"split": split, "pictures": pictures.value, "seed": seed}
+    made_here = {"split": split, "pictures": pictures.value, "seed": seed, **family_options(option)}
     learner.save(out, notes=made_here if demos_file is None else {"file": demos_file.name})
     checkpoint.unlink(missing_ok=True)
     figures = learner.header.get("training", {}) if hasattr(learner, "header") else {}
