@@ -6,6 +6,7 @@ Counted in checks of configurations, not in seconds, so that the same seed gives
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -78,7 +79,7 @@ def plan_joint_motion(
         if j - i > 1 and is_free_between(path[i], path[j], asked, resolution):
             path = [*path[: i + 1], *path[j:]]
     # OMPL's own spacing is not ours: nothing leaves that was not checked here.
-    pairs = zip(path[:-1], path[1:])
+    pairs = pairwise(path)
     return np.array(path) if all(is_free_between(a, b, asked, resolution) for a, b in pairs) else None
 
 

@@ -1,0 +1,159 @@
+"""A work cell: table, blocks and the arm in one simulator. One is acted in; a second one is only thought in.
+
+Everything is at its true size in metres, at 1/240 s a step. The table is the plane z = 0, the arm stands at the origin.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from neurosym.simulation.client import Client
+from neurosym.simulation.panda.arm import PandaArm
+from neurosym.simulation.scene import RGB
+from neurosym.simulation.solids import matrix, quaternion
+
+Array = NDArray[np.float64]
+
+TIME_STEP = 1 / 240
+#: Small bodies that touch many others want more of the contact solver than Bullet's usual 50.
+SOLVER_ITERATIONS = 150
+#: Of beech, kg a cubic metre: a 5 cm cube weighs 85 g.
+DENSITY = 680.0
+#: Free space that a planned motion keeps (metres): of arm and load to blocks, and to the table.
+MARGIN, TABLE_MARGIN = 0.006, 0.002
+
+
+@dataclass(frozen=True)
+class Load:
+    """A block in the hand: its name, and its pose in the tool's frame, float64 (4, 4)."""
+
+    name: str
+    X_TB: Array
+
+
+class Cell:
+    """Table, blocks and arm (a context manager).
+
+    Args:
+        sizes: name of a block -> float64 (3,), its edges.
+        poses: name of a block -> float64 (4, 4), where it lies at first.
+        friction: between any two blocks, and of blocks on the table.
+        colours: name of a block -> RGB in 0..1, for a window and pictures.
+        window: show it, in real time.
+    """
+
+    def __init__(
+        self,
+        sizes: Mapping[str, Array],
+        poses: Mapping[str, Array],
+        *,
+        friction: float = 0.5,
+        colours: Mapping[str, RGB] | None = None,
+        window: bool = False,
+    ) -> None:
+        self.sizes = dict(sizes)
+        self.window = window
+        self.client = Client(window=window)
+        self._p: Any = self.client.p
+        self._c = self.client.id
+        try:
+            self._build(poses, friction, colours or {})
+        except BaseException:
+            self.close()
+            raise
+
+    def _build(self, poses: Mapping[str, Array], friction: float, colours: Mapping[str, RGB]) -> None:
+        p, c = self._p, self._c
+        p.setGravity(0, 0, -9.81, physicsClientId=c)
+        p.setPhysicsEngineParameter(
+            fixedTimeStep=TIME_STEP,
+            numSolverIterations=SOLVER_ITERATIONS,
+            deterministicOverlappingPairs=1,
+            physicsClientId=c,
+        )
+        plane = p.createCollisionShape(p.GEOM_PLANE, physicsClientId=c)
+        self._table = p.createMultiBody(0, plane, physicsClientId=c)
+        surface = float(np.sqrt(friction))
+        p.changeDynamics(self._table, -1, lateralFriction=surface, physicsClientId=c)
+        self.arm = PandaArm(self.client)
+        self._blocks: dict[str, int] = {}
+        for name, size in self.sizes.items():
+            half = (size / 2).tolist()
+            shape = p.createCollisionShape(p.GEOM_BOX, halfExtents=half, physicsClientId=c)
+            rgba = [*colours.get(name, (0.8, 0.7, 0.5)), 1.0]
+            visual = p.createVisualShape(p.GEOM_BOX, halfExtents=half, rgbaColor=rgba, physicsClientId=c)
+            number = p.createMultiBody(DENSITY * float(np.prod(size)), shape, visual, physicsClientId=c)
+            p.changeDynamics(number, -1, lateralFriction=surface, spinningFriction=0.001, physicsClientId=c)
+            self._blocks[name] = number
+            self.put(name, poses[name])
+        if self.window:
+            p.resetDebugVisualizerCamera(1.2, 50, -25, (0.4, 0, 0.15), physicsClientId=c)
+
+    def close(self) -> None:
+        """Close the simulator; closing twice does nothing."""
+        self.client.close()
+
+    def __enter__(self) -> Cell:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def pose(self, block: str) -> Array:
+        """float64 (4, 4): where a block lies now."""
+        return matrix(*self._p.getBasePositionAndOrientation(self._blocks[block], physicsClientId=self._c))
+
+    def put(self, block: str, X: Array) -> None:
+        """Set a block's pose at once."""
+        turn = quaternion(X[:3, :3]).tolist()
+        number = self._blocks[block]
+        self._p.resetBasePositionAndOrientation(number, X[:3, 3].tolist(), turn, physicsClientId=self._c)
+
+    def step(self, steps: int = 1) -> None:
+        """Let time pass."""
+        for _ in range(steps):
+            self._p.stepSimulation(physicsClientId=self._c)
+            if self.window:
+                time.sleep(TIME_STEP)
+
+    def pinched(self, block: str) -> bool:
+        """Whether both fingers touch a block now."""
+        touching = self._p.getContactPoints(self.arm.body, self._blocks[block], physicsClientId=self._c)
+        return {9, 10} <= {point[3] for point in touching}
+
+    def is_free(self, q: Array, load: Load | None = None, ignored: Collection[str] = ()) -> bool:
+        """Whether the arm, and what it carries, would touch nothing at a configuration: to be asked in thought only.
+
+        Args:
+            q: float64 (7,).
+            load: what it carries.
+            ignored: names of blocks that the arm may touch.
+        """
+        p, c, arm = self._p, self._c, self.arm
+        arm.put(q)
+        for name, number in self._blocks.items():
+            if name in ignored or (load is not None and name == load.name):
+                continue
+            if p.getClosestPoints(arm.body, number, MARGIN, physicsClientId=c):
+                return False
+        # The base stands on the table.
+        if any(point[3] > 0 for point in p.getClosestPoints(arm.body, self._table, TABLE_MARGIN, physicsClientId=c)):
+            return False
+        if load is not None:
+            self.put(load.name, arm.X_WT @ load.X_TB)
+            held = self._blocks[load.name]
+            if p.getClosestPoints(held, self._table, TABLE_MARGIN, physicsClientId=c):
+                return False
+            others = [number for name, number in self._blocks.items() if name != load.name and name not in ignored]
+            if any(p.getClosestPoints(held, number, MARGIN, physicsClientId=c) for number in others):
+                return False
+        return not arm.meets_itself()
