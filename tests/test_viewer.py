@@ -587,6 +587,29 @@ def test_cells_travel_with_their_plan(tmp_path, capsys):
         problem_maker(replace(source.query, options={"nonsense": 1}), source.given)()
 
 
+def test_an_assembly_is_planned_as_plan_plans_it(tmp_path, capsys):
+    box = ns.Assembly.from_cells({"low": [(0, 0, 0)], "high": [(0, 0, 1)]})
+    box.save(tmp_path / "box.json")
+    page = tmp_path / "box.html"
+    assert call("view", tmp_path / "box.json", "--directions", "+z", "--no-gravity", "--export", page) == 0
+    text = page.read_text()
+    assert "backtracking with the prior outermost-first" in text
+    assert text.index("<li>high") < text.index("<li>low")
+    # Nothing goes down through the table.
+    assert call("view", tmp_path / "box.json", "--directions=-z", "--export", page) == 11
+    assert "the longest prefix that works is shown" in page.read_text()
+    assert "Nothing can be taken out" in page.read_text()
+
+
+def test_a_puzzle_of_ones_own(tmp_path, capsys):
+    cells = tmp_path / "cells.json"
+    cells.write_text(json.dumps({"a": [[0, 0, 0]], "b": [[0, 0, 1]]}))
+    page = tmp_path / "page.html"
+    assert call("view", "soma", "--cells", cells, "--before", "b,a", "--export", page) == 0
+    assert call("view", "soma", "--cells", cells, "--before", "a", "--export", page) == 33
+    assert call("view", "tower", "--cells", cells, "--export", page) == 33
+
+
 # -- the command --------------------------------------------------------------------------------------------------
 
 

@@ -117,7 +117,7 @@ def plan(
         family,
         collapse=collapse,
         pictures=None if pictures is Pictures.clean else pictures.value,
-        before=[_pair(text) for text in before] if before else None,
+        before=[pair_of(text) for text in before] if before else None,
         removed=removed or None,
     )
     options |= removal_options(directions, paths, groups, gravity, held, fixed) | family_options(option)
@@ -127,7 +127,7 @@ def plan(
             raise InputError(f"Expected --units with the files of an assembly; {what!r} is a problem family.")
         problem = _problem(family, number, cells, options)
         # Pieces of the user's own travel with their plan, so that it can be shown and replayed.
-        source = {} if cells is None else {"cells": _cells(cells)}
+        source = {} if cells is None else {"cells": cells_in(cells)}
     else:
         assembly = load_assembly(path, units)
         problem = _made(family, assembly, options | {"name": path.resolve().name})
@@ -194,7 +194,7 @@ def _problem(family: ProblemFamily, number: int | None, cells: Path | None, opti
     make = getattr(family, "problem_from_cells", None)
     if make is None:
         raise InputError(f"Expected a domain of polycube puzzles (soma) for --cells; {family.name!r} is none.")
-    problem: Problem = make(_cells(cells), **options)
+    problem: Problem = make(cells_in(cells), **options)
     return problem
 
 
@@ -205,7 +205,7 @@ def _made(family: ProblemFamily, given: Any, options: dict[str, Any]) -> Problem
         raise InputError(f"Expected options that problems of {family.name!r} take; {error}.") from None
 
 
-def _cells(path: Path) -> dict[str, Any]:
+def cells_in(path: Path) -> dict[str, Any]:
     try:
         given = json.loads(path.read_text(encoding="utf-8"), object_pairs_hook=_each_once)
     except ValueError as error:
@@ -215,7 +215,7 @@ def _cells(path: Path) -> dict[str, Any]:
     return given
 
 
-def _pair(text: str) -> tuple[str, str]:
+def pair_of(text: str) -> tuple[str, str]:
     names = [name.strip() for name in text.split(",")]
     if len(names) != 2 or not all(names):
         raise InputError(f"Expected --before A,B: two names with a comma between; got {text!r}.")

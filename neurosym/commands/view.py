@@ -4,12 +4,24 @@ from __future__ import annotations
 
 import threading
 import webbrowser
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from neurosym.commands.assemblies import (
+    Directions,
+    Fixed,
+    Gravity,
+    Groups,
+    Held,
+    PathsOption,
+    Units,
+    removal_options,
+)
 from neurosym.commands.common import CollapseRule, FamilyOptions, Oracle, OracleName, family_options, say
+from neurosym.commands.plan import cells_in, pair_of
 from neurosym.errors import InputError
 
 if TYPE_CHECKING:
@@ -24,7 +36,8 @@ def view(
     target: Annotated[
         str,
         typer.Argument(
-            metavar="TARGET", help="A domain (`neurosym list` names them), a plan.json, or a file or folder to plan."
+            metavar="PATH|DOMAIN",
+            help="A plan.json, an assembly of yours as for `plan`, or a problem family (`neurosym list` names them).",
         ),
     ],
     number: Annotated[
@@ -32,13 +45,31 @@ def view(
     ] = None,
     planner: Annotated[str, typer.Option("--planner", metavar="P", help="Name of a planner.")] = "backtracking",
     prior: Annotated[
-        str, typer.Option("--prior", metavar="Q", help="Name of a prior, a weights file, or `none`.")
-    ] = "none",
+        str | None,
+        typer.Option(
+            "--prior",
+            metavar="Q",
+            help="Name of a prior, a weights file, or `none`. Default none; for an assembly outermost-first.",
+        ),
+    ] = None,
+    cells: Annotated[
+        Path | None, typer.Option("--cells", metavar="FILE", help='A puzzle of yours: JSON {"name": [[x,y,z], ...]}.')
+    ] = None,
     option: FamilyOptions = None,
     collapse: CollapseRule = None,
-    units: Annotated[
-        str | None, typer.Option("--units", metavar="U", help="What a length of 1 is in a file: mm, m, in, ...")
+    before: Annotated[
+        list[str] | None, typer.Option("--before", metavar="A,B", help="A must come before B. May be repeated.")
     ] = None,
+    removed: Annotated[
+        list[str] | None, typer.Option("--removed", metavar="V", help="Is gone already. May be repeated.")
+    ] = None,
+    units: Units = None,
+    directions: Directions = None,
+    paths: PathsOption = None,
+    groups: Groups = None,
+    gravity: Gravity = None,
+    held: Held = None,
+    fixed: Fixed = None,
     oracle: OracleName = Oracle.geometry,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Breaks ties; the same seed gives the same plan.")] = 0,
     seconds: Annotated[float | None, typer.Option("--seconds", help="Budget: wall-clock time.")] = None,
@@ -63,11 +94,17 @@ def view(
 
     if export is not None:
         check_name(export)
-    options = ({} if collapse is None else {"collapse": collapse}) | ({} if units is None else {"units": units})
+    named = {
+        "collapse": collapse,
+        "before": [pair_of(text) for text in before] if before else None,
+        "removed": removed or None,
+        "units": units,
+    }
+    options = {name: value for name, value in named.items() if value is not None}
     query = Query(
         domain=target,
         number=number,
-        options=options | family_options(option),
+        options=options | removal_options(directions, paths, groups, gravity, held, fixed) | family_options(option),
         planner=planner,
         prior=None if prior == "none" else prior,
         oracle=oracle.value,
@@ -76,7 +113,9 @@ def view(
         attempts=attempts,
     )
     check_query(query)
-    source = open_source(query)
+    source = open_source(query, None if cells is None else cells_in(cells))
+    if prior is None and source.saved is None:
+        source = replace(source, query=replace(source.query, prior=source.usual_prior))
     shown = None if source.saved is None else Shown.saved(source.saved)
     if export is None:
         _serve(source, shown, host=host, port=port, browser=browser)

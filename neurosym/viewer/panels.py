@@ -82,6 +82,7 @@ def steps(shown: Shown, now: int | None) -> str:
         how = f" <span class='quiet'>{escape(in_short(motions[i]))}</span>" if motions else ""
         rows.append(f"<li{_MARKED if i == now else ''}>{escape(action)}{how}</li>")
     what = "" if shown.search.solved else "<p class='note'>No plan: the longest prefix that works is shown.</p>"
+    what += "".join(f"<p>{escape(sentence)}</p>" for sentence in shown.search.why_not)
     return f"{what}<ol>{''.join(rows)}</ol>" if rows else f"{what}<p>There is no step to show.</p>"
 
 

@@ -72,6 +72,7 @@ class Search:
         counts: figures by name, for people.
         settings: planner, prior and oracle in a few words.
         scores: the prior's, or None.
+        why_not: sentences that say why there is no plan, where the problem can tell.
     """
 
     steps: tuple[str, ...]
@@ -82,6 +83,7 @@ class Search:
     counts: Mapping[str, float]
     settings: str
     scores: OrderScores | None = None
+    why_not: tuple[str, ...] = ()
 
     @property
     def solved(self) -> bool:
@@ -99,7 +101,8 @@ class Search:
         how = () if result.plan is None else result.how
         settings = _settings(query.planner, query.prior, query.oracle)
         sentence = said or result.status.sentence
-        return cls(steps, how, result.status, sentence, result.blame, counts, settings, scores)
+        why_not = () if result.why_not is None else tuple(result.why_not.sentences)
+        return cls(steps, how, result.status, sentence, result.blame, counts, settings, scores, why_not)
 
     @classmethod
     def saved(cls, saved: SavedPlan, scores: OrderScores | None) -> Search:
@@ -116,10 +119,11 @@ class Search:
                 for r in document["refusals"]
             )
             counts = {name: document[name] for name in _COUNTS if isinstance(document[name], int | float)}
-        except (KeyError, TypeError) as error:
+            why_not = tuple(map(str, (document.get("why_not") or {}).get("sentences", ())))
+        except (AttributeError, KeyError, TypeError) as error:
             raise InputError(f"Expected a plan's file as `neurosym plan --out` writes it; got {error!r}.") from None
         settings = _settings(*(document.get(key) for key in ("planner", "prior", "oracle")))
-        return cls(saved.plan, saved.how, status, status.sentence, refusals, counts, settings, scores)
+        return cls(saved.plan, saved.how, status, status.sentence, refusals, counts, settings, scores, why_not)
 
 
 _COUNTS = ("iterations", "attempts", "expansions", "seconds")

@@ -4,17 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from neurosym.errors import UnknownNameError
+from neurosym.errors import InputError, UnknownNameError
 from neurosym.language.domain import Problem
 from neurosym.plan_files import SavedPlan, problem_of, read_document, read_plan
 from neurosym.registry import domain_names, load_domain
 from neurosym.viewer.session import Maker, Query, problem_maker
 
-#: The family of assemblies that are files.
-ASSEMBLY = "assembly"
+#: The family of assemblies that are files, and the prior that such a one is given where nobody names one.
+ASSEMBLY, UNTRAINED = "assembly", "outermost-first"
+
+#: What a puzzle of the user's own is called on the page.
+PUZZLE = "your puzzle"
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,29 +30,46 @@ class Source:
         problem: the problem, made.
         given: what bears no number in a family: name on the page -> what makes it, of options.
         saved: the plan, where a file holds one.
+        usual_prior: the prior that it is planned with where nobody names one.
     """
 
     query: Query
     problem: Problem
     given: Mapping[str, Maker]
     saved: SavedPlan | None = None
+    usual_prior: str | None = None
 
 
-def open_source(query: Query) -> Source:
-    """Open the domain, or the file at the path, that `query.domain` names.
+def open_source(query: Query, cells: Mapping[str, Any] | None = None) -> Source:
+    """Open the domain, or the file at the path, that `query.domain` names; a path wins where no problem is named.
+
+    Args:
+        cells: a puzzle of the user's own for a domain of polycubes, {name: [(x, y, z), ...]}.
 
     Raises:
         UnknownNameError: neither a domain nor a path.
         InputError: a file that is neither a plan nor an assembly.
     """
     path = Path(query.domain)
-    if query.domain in domain_names():
-        query = replace(query, number=query.number or 0)
-        return Source(query, problem_maker(query, {})(), {})
-    if not path.exists():
+    if path.exists() and query.number is None and cells is None:
+        return _plan_at(path, query) if _is_plan(path) else _assembly_at(path, query)
+    if query.domain not in domain_names():
         hint = f"There is no file or folder {query.domain!r} either."
         raise UnknownNameError("domain", query.domain, domain_names(), hint=hint)
-    return _plan_at(path, query) if _is_plan(path) else _assembly_at(path, query)
+    if cells is not None:
+        return _puzzle(query, cells)
+    query = replace(query, number=query.number or 0)
+    return Source(query, problem_maker(query, {})(), {})
+
+
+def _puzzle(query: Query, cells: Mapping[str, Any]) -> Source:
+    family = load_domain(query.domain)
+    make = getattr(family, "problem_from_cells", None)
+    if make is None or query.number is not None:
+        raise InputError(f"Expected cells with a domain of polycube puzzles (soma), without a number; got {query}.")
+    given: dict[str, Maker] = {PUZZLE: partial(make, cells)}
+    query = replace(query, domain=PUZZLE)
+    return Source(query, problem_maker(query, given)(), given)
 
 
 def _is_plan(path: Path) -> bool:
@@ -91,9 +112,9 @@ def _assembly_at(path: Path, query: Query) -> Source:
         return family.problem(path, **options)
 
     name = _name_for(path)
-    query = replace(query, domain=name, number=None)
+    query = replace(query, domain=name)
     given: dict[str, Maker] = {name: make}
-    return Source(query, problem_maker(query, given)(), given)
+    return Source(query, problem_maker(query, given)(), given, usual_prior=UNTRAINED)
 
 
 def _name_for(path: Path) -> str:
