@@ -111,6 +111,8 @@ def _walk(
                 if answer.unconditional and answer.until:
                     lessons.append((a, answer))
                 _require(bool(answer.reason), f"{label} to give a reason for each refusal", search.actions[a])
+                sure = answer.proved or not answer.unconditional
+                _require(sure, f"{label} to promise nothing everywhere that it has not proved", search.actions[a])
                 if answer.until:
                     standing[a] = (set(answer.until), answer)
         names = [search.actions[b] for b in done]

@@ -17,7 +17,7 @@ from neurosym.planner import MAX_BLAME, Budget, Planner, PlanResult, Status
 from neurosym.prior import OrderScores
 from neurosym.problem import SearchProblem, Step
 from neurosym.registry import load_planner
-from neurosym.testing.toys import Counting, NumberLine, Relabelled, Removal, Table, Tiles, brute_force_plans
+from neurosym.testing.toys import Counting, NumberLine, Relabelled, Removal, Table, Tiles, Unproved, brute_force_plans
 
 #: Costs further apart than this (nats) differ. Planners may take costs within 1e-6 nats a plan for equal.
 TOLERANCE = 1e-5
@@ -106,6 +106,7 @@ def check_planner(planner: str | Planner, *, seeds: int = 12) -> None:
                 _check_k_best(made, toy, scores, where)
         _check_budgets(made, toy)
     _check_use_of_scores(made)
+    _check_unproved(made, seeds)
     _check_relabelling(made, seeds)
 
 
@@ -252,6 +253,17 @@ def _check_use_of_scores(planner: Planner) -> None:
         plain = planner.plan(toy.problem, None, rng=np.random.default_rng(3))
         expected = tuple(names[a] for a in order) if planner.traits.uses_scores else plain.plan
         _require(result.plan == expected, where, f"the plan {expected}", result.plan)
+
+
+def _check_unproved(planner: Planner, seeds: int) -> None:
+    """What was refused without proof is never called unsolvable."""
+    for seed in range(seeds):
+        toy = Toy.of(f"removal {seed}, nothing proved", Unproved(Removal.random(seed)))
+        counting: Counting[Any] = Counting(toy.problem)
+        result = planner.plan(counting, None, rng=np.random.default_rng(3))
+        wrong = Status.UNSOLVABLE if counting.refusals else None
+        where = f"{type(planner).__name__} on {toy.name!r}"
+        _require(result.status is not wrong, where, "GAVE_UP after refusals that prove nothing", result.status.name)
 
 
 def _check_relabelling(planner: Planner, seeds: int) -> None:

@@ -6,7 +6,7 @@ They satisfy `SearchProblem`. `brute_force_plans` finds all their plans, and sha
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Generic, TypeVar
 
 import numpy as np
@@ -121,6 +121,35 @@ class Removal:
         first = dict.fromkeys((way & -way).bit_length() - 1 for way in present)
         names = tuple(self.actions[p] for p in first)
         return Rejection("Blocked in every direction.", names, tuple(first) if self.promises else (), self.promises)
+
+
+@dataclass(frozen=True)
+class Unproved:
+    """A removal whose refusals prove nothing, as those of a search for a path that ended without one."""
+
+    base: Removal
+
+    @property
+    def actions(self) -> tuple[str, ...]:
+        return self.base.actions
+
+    @property
+    def classes(self) -> tuple[int, ...]:
+        return self.base.classes
+
+    @property
+    def initial(self) -> int:
+        return self.base.initial
+
+    def is_goal(self, state: int) -> bool:
+        return self.base.is_goal(state)
+
+    def candidates(self, state: int) -> list[int]:
+        return self.base.candidates(state)
+
+    def attempt(self, state: int, action: int) -> Step[int] | Rejection:
+        answer = self.base.attempt(state, action)
+        return replace(answer, until=(), unconditional=False, proved=False) if isinstance(answer, Rejection) else answer
 
 
 @dataclass(frozen=True)
