@@ -214,8 +214,9 @@ def test_touch_and_little_overlaps_are_no_hits(overlap, holds, meshes):
 
 
 def test_meshes_put_together_from_others_touch_without_hitting():
+    # They overlap the wall a little, too, as parts do that mate.
     drawer = trimesh.util.concatenate(
-        [trimesh.creation.box((1, 1, 1)).apply_translation((0.5 + k, 0.5, 0.5)) for k in range(3)]
+        [trimesh.creation.box((1, 1.0016, 1)).apply_translation((0.5 + k, 0.5, 0.5)) for k in range(3)]
     )
     wall = trimesh.creation.box((3, 1, 1)).apply_translation((1.5, 1.5, 0.5))
     parts = [
@@ -390,6 +391,41 @@ def test_with_ground_below_nothing_leaves_through_it():
     assert isinstance(held, Failure)
     assert held.proved
     assert isinstance(extract(assembly, 0b001, 0b101, rng=rng(), kinds=("lattice",), ground=0.0), Path)
+
+
+def test_a_part_that_comes_down_to_the_ground_leaves_under_the_walls():
+    part = boxes("part", ((0, 0, 1), (1, 1, 2)))
+    walls = boxes(
+        "walls",
+        ((-1, -1, 1), (0, 2, 3)), ((1, -1, 1), (2, 2, 3)), ((0, -1, 1), (1, 0, 3)), ((0, 1, 1), (1, 2, 3)),
+        ((0, 0, 2), (1, 1, 3)),
+    )  # fmt: skip
+    assembly = ns.Assembly((part, walls))
+    path = extract(assembly, 0b01, 0b11, rng=rng(), kinds=("lattice",), ground=0.0)
+    assert isinstance(path, Path)
+    assert path.poses[1][2, 3] == pytest.approx(-1.0)
+    high = extract(assembly, 0b01, 0b11, rng=rng(), kinds=("lattice",), ground=0.5)
+    assert isinstance(high, Failure)
+    assert high.proved
+
+
+def test_only_boxes_and_translations_give_proofs():
+    box = boxes("box", ((0, 0, 0), (1, 1, 1)))
+    shell = boxes(
+        "shell",
+        ((-1, -1, -1), (2, 2, 0)), ((-1, -1, 1), (2, 2, 2)), ((-1, -1, 0), (0, 2, 1)), ((1, -1, 0), (2, 2, 1)),
+        ((0, -1, 0), (1, 0, 1)), ((0, 1, 0), (1, 2, 1)),
+    )  # fmt: skip
+    closed = ns.Assembly((box, shell))
+    for assembly, kinds, proved in (
+        (closed, ("lattice",), True),
+        (closed, ("rigid",), False),
+        (as_meshes(closed), ("lattice",), False),
+    ):
+        failure = extract(assembly, 0b01, 0b11, rng=rng(), kinds=kinds, max_checks=3_000)
+        assert isinstance(failure, Failure)
+        assert failure.proved is proved
+        assert failure.because == ("shell",)
 
 
 def test_groups_leave_as_one():

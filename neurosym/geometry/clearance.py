@@ -177,7 +177,7 @@ class Clearance:
         return np.where(meets, np.maximum(enter, 0.0), np.inf)
 
     def _apart(self, i: NDArray[np.int64], j: NDArray[np.int64]) -> Array:
-        """From the centres of moving boxes to those of others, where they are assembled, along the moving ones' axes."""
+        """From moving boxes' centres to others', where they are assembled, along the axes of the moving ones."""
         found: Array = np.einsum("nd,ndi->ni", self._Y[j, :3, 3] - self._X[i, :3, 3], self._X[i, :3, :3])
         return found
 

@@ -1,10 +1,11 @@
 """A lattice of translations whose lines lie where faces come level, and quarter turns if wanted, searched by A*.
 
 Offsets along each axis of the moving parts are those at which one of their faces comes level with a face of the
-others, so passages without any play have lattice lines in them. Between boxes with common axes that is complete: the
-free offsets are cut by these planes into boxes, each of them free or not as a whole, and any way through free ones can
-be moved onto their edges. There a search that ends without a way out proves that no translations lead out. For other
-shapes the levels of the commonest corners stand in, filled up by even steps.
+others, so passages without any play have lattice lines in them. Between boxes with common axes those at which a lower
+face comes to lie on an upper one are enough: any free place can be moved down along each axis until something is
+underneath, and the places so moved hang together as the free places did. There a search that ends without a way out
+proves that no translations lead out. For other shapes the levels of the commonest corners stand in, filled up by even
+steps.
 
 With turns, parts may also turn by 90° about their axes, through the middle of any of their bodies: a key in its lock.
 That proves nothing.
@@ -230,10 +231,8 @@ class Lattice:
             lowest = low if direction[2] > 0 else high
             must.append(removal.ground * float(np.sign(direction[2])) - float(lowest))
         if removal.aligned:
-            own_low, own_high = (np.unique([f(o) for o in own]) for f in (np.min, np.max))
-            other_low, other_high = (np.unique([f(o) for o in others]) for f in (np.min, np.max))
-            levels = [(other_low[:, None] - own_high).ravel(), (other_high[:, None] - own_low).ravel()]
-            found = _merged(np.concatenate(levels), must, start, end, assembly.touch, None)
+            lower, upper = np.unique([o.min() for o in own]), np.unique([o.max() for o in others])
+            found = _merged((upper[:, None] - lower).ravel(), must, start, end, assembly.touch, None)
         else:
             common = [_commonest(np.concatenate(points), assembly.touch) for points in (own, others)]
             must.extend(np.linspace(start, end, FILL).tolist())
