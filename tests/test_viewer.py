@@ -5,9 +5,11 @@ from __future__ import annotations
 import itertools
 import json
 import shutil
+import signal
 import subprocess
 import sys
 import time
+import urllib.request
 from collections import Counter
 from dataclasses import replace
 
@@ -806,6 +808,37 @@ def test_stop_ends_a_search(tab, viewer):
 def test_nobody_can_ask_for_a_tunnel(viewer):
     assert viewer.server.request_share_url() is None
     assert viewer.server.get_host() == "127.0.0.1"
+
+
+@pytest.mark.parametrize(
+    ("origin", "heard"),
+    [("http://evil.example", False), ("http://127.0.0.1.evil.example:8080", False), ("http://localhost:8080", True)],
+)
+def test_pages_of_other_sites_are_not_heard(viewer, origin, heard):
+    import viser
+    from websockets.exceptions import InvalidStatus
+    from websockets.sync.client import connect
+
+    address = f"ws://127.0.0.1:{viewer.server.get_port()}"
+    settings = {"origin": origin, "subprotocols": [f"viser-v{viser.__version__}"], "compression": None}
+    if heard:
+        with connect(address, **settings) as socket:
+            assert socket.recv(timeout=10)
+        return
+    with pytest.raises(InvalidStatus, match="403"):
+        connect(address, **settings)
+
+
+def test_the_command_serves_until_the_keyboard_ends_it():
+    command = [sys.executable, "-m", "neurosym.cli", "view", "soma", "--problem", "17", "--no-browser", "--port", "0"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        address = process.stdout.readline().split()[0]
+        with urllib.request.urlopen(address, timeout=30) as page:
+            assert b'<div id="root">' in page.read()
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=60)
+    assert address.startswith("http://127.0.0.1:")
+    assert (process.returncode, out, err) == (0, "Ended.\n", "")
 
 
 # -- the export ---------------------------------------------------------------------------------------------------

@@ -1,15 +1,24 @@
-"""The local server: viser, quiet, on loopback, without the tunnel that shares a page with the world."""
+"""The local server: viser, quiet, on loopback, for its own page alone, without the tunnel that shares a page."""
 
 from __future__ import annotations
 
 import contextlib
+import functools
 import io
+import re
+from collections.abc import Iterator
 
 import viser
+import websockets.asyncio.server
+
+#: Addresses that this machine alone can reach.
+LOOPBACKS = ("127.0.0.1", "localhost", "::1")
+
+_OWN_PAGE = re.compile(r"https?://(127\.0\.0\.1|localhost|\[::1\])(:\d+)?")
 
 
 class LocalServer(viser.ViserServer):
-    """A viser server that prints nothing and opens no tunnel.
+    """A viser server that prints nothing, opens no tunnel and, on loopback, hears no other site's page.
 
     Args:
         host: which interface to listen on.
@@ -18,7 +27,7 @@ class LocalServer(viser.ViserServer):
     """
 
     def __init__(self, host: str = "127.0.0.1", port: int = 0, label: str | None = None) -> None:
-        with contextlib.redirect_stdout(io.StringIO()):
+        with contextlib.redirect_stdout(io.StringIO()), _own_page_only(host in LOOPBACKS):
             super().__init__(host=host, port=port, label=label, verbose=False)
 
     def request_share_url(self, verbose: bool = True) -> str | None:
@@ -29,3 +38,19 @@ class LocalServer(viser.ViserServer):
         """Stop serving."""
         with contextlib.redirect_stdout(io.StringIO()):
             super().stop()
+
+
+@contextlib.contextmanager
+def _own_page_only(wanted: bool) -> Iterator[None]:
+    """Servers started inside refuse a web socket that a page of another origin opens: any site could, to read along.
+
+    viser has no option for it, so the function that it starts them with is given the origins here.
+    """
+    serve = websockets.asyncio.server.serve
+    if wanted:
+        narrowed = functools.partial(serve, origins=[None, _OWN_PAGE])
+        websockets.asyncio.server.serve = narrowed  # type: ignore[assignment,misc]
+    try:
+        yield
+    finally:
+        websockets.asyncio.server.serve = serve  # type: ignore[misc]
