@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import shapely
@@ -31,8 +31,16 @@ NOISE = 1e-6
 #: Normals of one body along which a gap is looked for; a body with more is asked about these many.
 MAX_NORMALS = 256
 
-#: Pairs of faces clipped, and corners measured, for one pair of bodies: evenly spread ones where there are more.
-MAX_PATCHES, MAX_CORNERS = 4_000, 256
+#: For one pair of bodies, pairs of faces clipped, points asked whether they lie inside, and points measured that do:
+#: evenly spread ones where there are more.
+MAX_PATCHES, MAX_ASKED, MAX_MEASURED = 4_000, 4_000, 256
+
+#: Places where edges go through faces that are joined two by two.
+MAX_PLACES = 40
+
+#: Bodies with more pairs of faces than this are searched for overlaps up to `FAR` of the smallest extent only; deeper
+#: ones show by points that far under their faces.
+DENSE, FAR = 100_000, 0.1
 
 #: Faces look at one another when the cosine between their normals is below this.
 _FACING = -0.1
@@ -68,7 +76,7 @@ def _overlaps(assembly: Assembly) -> Iterator[Overlap]:
         a, b = bodies[int(i)], bodies[int(j)]
         reach = _least_width(a, b)
         if reach > noise:
-            depth = min(_depth(a, b, noise), reach)
+            depth = min(_depth(a, b, noise, FAR * assembly.smallest_extent), reach)
             if depth > noise:
                 yield Overlap(int(i), int(j), depth)
 
@@ -93,8 +101,12 @@ class _Body:
     def directions(self) -> Array:
         """Unit normals (k, 3), each direction once, no more than `MAX_NORMALS`."""
         rounded = np.round(self.normals, 6)
-        found: Array = np.unique(rounded, axis=0)
-        return found[:: -(-len(found) // MAX_NORMALS)]
+        return _some(np.unique(rounded, axis=0), MAX_NORMALS)
+
+
+def _some(rows: NDArray[Any], limit: int) -> NDArray[Any]:
+    """The rows, or evenly spread ones where there are more than `limit`."""
+    return rows[:: max(1, -(-len(rows) // limit))]
 
 
 def _least_width(a: _Body, b: _Body) -> float:
@@ -107,19 +119,26 @@ def _least_width(a: _Body, b: _Body) -> float:
     return width
 
 
-def _depth(a: _Body, b: _Body, noise: float) -> float:
-    """The depth of the overlap of two bodies; see the top of this module."""
+def _depth(a: _Body, b: _Body, noise: float, far: float) -> float:
+    """The depth of the overlap of two bodies; see the top of this module. `far`: how deep to look among many faces."""
     low = np.maximum(a.vertices.min(axis=0), b.vertices.min(axis=0))
     high = np.minimum(a.vertices.max(axis=0), b.vertices.max(axis=0))
     # Surfaces farther off than the overlap is wide are nobody's nearest: depths beyond are not asked for.
     margin = float((high - low).min())
     middle = (low + high) / 2
     near_a, near_b = _near(a, low - margin, high + margin), _near(b, low - margin, high + margin)
+    few = len(near_a.triangles) * len(near_b.triangles) <= DENSE
     depth = 0.0
     for one, other, around in ((a, b, near_b), (b, a, near_a)):
-        corners = one.vertices[((one.vertices > low) & (one.vertices < high)).all(axis=1)]
+        corners = one.vertices[((one.vertices >= low) & (one.vertices <= high)).all(axis=1)]
         depth = max(depth, _deepest(corners - middle, [other.triangles - middle], [around.triangles - middle], noise))
-    centres = _between(near_a, near_b, middle, noise)
+    pairs = np.argwhere(near_a.normals @ near_b.normals.T < _FACING) if few else _near_faces(near_a, near_b, far)
+    points = [_between(near_a, near_b, pairs, middle, noise)]
+    if not few:
+        points += [n.triangles.mean(axis=1) - far / 2 * n.normals - middle for n in (near_a, near_b)]
+    if few:
+        points.append(_amid(near_a, near_b, noise) - middle)
+    centres = np.concatenate(points)
     surfaces = [a.triangles - middle, b.triangles - middle]
     near = [near_a.triangles - middle, near_b.triangles - middle]
     return max(depth, 2 * _deepest(centres, surfaces, near, noise / 2))
@@ -133,9 +152,10 @@ def _near(body: _Body, low: Array, high: Array) -> _Body:
 
 def _deepest(points: Array, surfaces: list[Array], near: list[Array], noise: float) -> float:
     """The largest distance of any of the points (n, 3) that lie within all surfaces from the nearest of them."""
+    points = _some(points, MAX_ASKED)
     for surface in surfaces:
         points = points[triangles.are_inside(points, surface)]
-    points = points[:: max(1, -(-len(points) // MAX_CORNERS))]
+    points = _some(points, MAX_MEASURED)
     if not len(points):
         return 0.0
     faces = np.concatenate(near)
@@ -145,15 +165,27 @@ def _deepest(points: Array, surfaces: list[Array], near: list[Array], noise: flo
     return away if away > noise else 0.0
 
 
-def _between(a: _Body, b: _Body, middle: Array, noise: float) -> Array:
-    """Points (n, 3), from `middle`, halfway between faces of two bodies that have passed one another."""
-    i, j = np.nonzero(a.normals @ b.normals.T < _FACING)
+def _near_faces(a: _Body, b: _Body, far: float) -> NDArray[np.int64]:
+    """Pairs (k, 2) of faces of two bodies that look at one another from no farther than `far`, or close to it."""
+    low, high = triangles.bounds(a.triangles)
+    rows, pairs = np.arange(len(low)), None
+    while pairs is None:
+        around = (low[rows] - far, high[rows] + far)
+        pairs = triangles.near_pairs(around, triangles.bounds(b.triangles), triangles.CHUNK)
+        rows = rows if pairs is not None else rows[::2]
+    pairs[:, 0] = rows[pairs[:, 0]]
+    facing = np.einsum("kd,kd->k", a.normals[pairs[:, 0]], b.normals[pairs[:, 1]]) < _FACING
+    return np.asarray(pairs[facing])
+
+
+def _between(a: _Body, b: _Body, pairs: NDArray[np.int64], middle: Array, noise: float) -> Array:
+    """Points (n, 3), from `middle`, halfway between those pairs (k, 2) of faces that have passed one another."""
+    i, j = pairs.T
     # Passed: each face has some corner beyond the other's plane.
     ta, tb, na, nb = a.triangles[i] - middle, b.triangles[j] - middle, a.normals[i], b.normals[j]
     passed = np.einsum("kcd,kd->kc", ta - tb[:, :1], nb).min(axis=1) < -noise / 2
     passed &= np.einsum("kcd,kd->kc", tb - ta[:, :1], na).min(axis=1) < -noise / 2
-    chosen = np.flatnonzero(passed)
-    chosen = chosen[:: max(1, -(-len(chosen) // MAX_PATCHES))]
+    chosen = _some(np.flatnonzero(passed), MAX_PATCHES)
     ta, tb, na, nb = ta[chosen], tb[chosen], na[chosen], nb[chosen]
     # Each pair of faces is looked at along the mean of its two normals: n, with u and v across.
     n = na - nb
@@ -172,6 +204,28 @@ def _between(a: _Body, b: _Body, middle: Array, noise: float) -> Array:
     passed = over_a - over_b > noise
     points: Array = flat[passed] + (over_a + over_b)[passed, None] / 2 * n[rows[passed]]
     return points
+
+
+def _amid(a: _Body, b: _Body, noise: float) -> Array:
+    """Points (n, 3) halfway between any two places where an edge of one body goes through a face of the other.
+
+    Where one body goes right through the other, its faces look at none of the other's; these points lie in both.
+    """
+    found = [np.zeros((0, 3))]
+    for one, other in ((a, b), (b, a)):
+        edges = np.concatenate([one.triangles[:, [k, (k + 1) % 3]] for k in range(3)])
+        # Each edge belongs to two faces, and is gone along once either way.
+        edges = edges[(edges[:, 0] < edges[:, 1]).argmax(axis=1) == (edges[:, 0] != edges[:, 1]).argmax(axis=1)]
+        around = (edges.min(axis=1), edges.max(axis=1))
+        pairs = triangles.near_pairs(around, triangles.bounds(other.triangles), triangles.CHUNK)
+        if pairs is not None and len(pairs):
+            i, j = pairs.T
+            through, where = triangles.pierced(edges[i], other.triangles[j], other.normals[j], noise / 2)
+            found.append(where[through])
+    places = _some(np.concatenate(found), MAX_PLACES)
+    i, j = np.triu_indices(len(places), 1)
+    halfway: Array = (places[i] + places[j]) / 2
+    return halfway
 
 
 def _spots(patches: NDArray[np.object_]) -> tuple[Array, NDArray[np.int64]]:

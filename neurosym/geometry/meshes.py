@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from neurosym.errors import AssemblyError
 from neurosym.geometry.assembly import Body, Box, Convex, Mesh, Part
 from neurosym.geometry.tolerances import Tolerances
+from neurosym.geometry.triangles import are_convex
 
 Array = NDArray[np.float64]
 Triangles = tuple[Array, NDArray[np.int64]]
@@ -78,12 +79,7 @@ def _one_body(vertices: Array, faces: NDArray[np.int64]) -> Body:
     X = np.eye(4)
     X[:3, 3] = centre
     local = vertices - centre
-    triangles = local[faces]
-    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-    normals = normals / np.maximum(lengths, 1e-300)
-    above = (local[None] - triangles[:, :1]) @ normals[..., None]
-    convex = float(above.max()) <= 1e-9 * float(np.ptp(local)) if len(local) * len(faces) < 4_000_000 else False
+    convex = are_convex(local, local[faces], 1e-9 * float(np.ptp(local)))
     return Body((Convex if convex else Mesh)(local, faces), X)
 
 

@@ -1,4 +1,8 @@
-"""Polygons into triangles. A fan is right for convex ones only, so any other is cut ear by ear."""
+"""Polygons into triangles. A fan is right for convex ones only, so any other is cut ear by ear.
+
+Polygons of real parts are seldom quite flat, and two parts that mate share them. So a fan starts where the corners say,
+not where the file begins: the same corners give the same triangles in both parts, and the two surfaces coincide.
+"""
 
 from __future__ import annotations
 
@@ -29,10 +33,30 @@ def triangulate(vertices: Array, polygons: Sequence[Indices]) -> Indices:
             found.append(same)
             continue
         convex = _are_convex(vertices[same])
+        same[convex] = _turned(same[convex], vertices)
         fan = np.stack([np.zeros(size - 2, dtype=np.int64), np.arange(1, size - 1), np.arange(2, size)], axis=1)
         found.append(same[convex][:, fan].reshape(-1, 3))
         found.extend(polygon[_ears(vertices[polygon])] for polygon in same[~convex])
     return np.concatenate(found) if found else np.zeros((0, 3), dtype=np.int64)
+
+
+def _turned(polygons: Indices, vertices: Array) -> Indices:
+    """Polygons (n, k) that start, of four corners, on the shorter diagonal, else at the least corner (x, y, z).
+
+    The least corner decides, too, between diagonals of one length.
+    """
+    corners = vertices[polygons]
+    rows = np.arange(len(polygons))
+    lowest = np.ones(polygons.shape, dtype=bool)
+    for axis in range(3):
+        lowest &= corners[..., axis] == np.where(lowest, corners[..., axis], np.inf).min(axis=1, keepdims=True)
+    least = lowest.argmax(axis=1)
+    if polygons.shape[1] == 4:
+        one, other = (np.linalg.norm(corners[:, k] - corners[:, k + 2], axis=1) for k in (0, 1))
+        tie = np.abs(one - other) <= 1e-9 * np.maximum(one, other)
+        least = np.where(tie, least % 2, (other < one).astype(np.int64))
+    start = (least[:, None] + np.arange(polygons.shape[1])) % polygons.shape[1]
+    return np.asarray(polygons[rows[:, None], start])
 
 
 def _are_convex(corners: Array) -> NDArray[np.bool_]:
