@@ -72,7 +72,7 @@ class Equilibrium:
         patch: int64 (c,): the patch of each corner; corners come patch by patch.
         a, b: int64 (c,): the parts of each corner; b may be `TABLE`.
         weights: float64 (n_parts, 6): what forces must add up to on each part, scaled.
-        lift: float64 (c, CONE_EDGES): the upward share of each edge's force on a, in units of the mean weight.
+        lift: float64 (c, CONE_EDGES): the upward share of each edge's force on a, per unit of it.
     """
 
     def __init__(self, assembly: Assembly, patches: tuple[Contact, ...], masses: Array, centres: Array) -> None:
@@ -99,12 +99,12 @@ class Equilibrium:
             np.maximum.at(sizes, part[real], np.linalg.norm(at[real] - centres[part[real]], axis=1))
         self.weights = np.zeros((n, 6))
         self.weights[:, 2] = masses / scale
-        # A corner's forces are counted in the lighter part's weight.
-        unit = np.where(self.b == TABLE, scale[self.a], np.minimum(scale[self.a], scale[self.b]))
+        # All forces are counted in the mean weight: a light part may have to carry a heavy one.
+        unit = np.full(len(self.a), scale.mean())
         self.on_a = _wrenches(axes, at - centres[self.a], sizes[self.a]) * (unit / scale[self.a])[:, None, None]
         self.on_b = -_wrenches(axes, at - centres[self.b], sizes[self.b]) * (unit / scale[self.b])[:, None, None]
         self.on_b[self.b == TABLE] = 0.0
-        self.lift = (axes[:, 2] @ self.edges) * (unit / masses.mean())[:, None]
+        self.lift = axes[:, 2] @ self.edges
 
     def wrenches(self, corners: Numbers, forces: Array, count: int) -> Array:
         """float64 (count, 6): what forces (k, CONE_EDGES) at these corners add up to on each part, scaled."""

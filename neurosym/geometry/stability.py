@@ -223,9 +223,9 @@ class Stability:
             self.asked["kept"] += 1
             forces = start[question.corners]
             return self._stood(question, forces, held)
-        # All others immovable: if these parts fall even so, they fall.
+        # All others immovable: if these parts fall even so, they fall. What was only relieved of a load hardly does.
         near = self._question(question.subset, self._with_ring(unbalanced, question.movable))
-        if len(near.parts) < len(question.parts):
+        if len(near.parts) < len(question.parts) and left[:, 2].max() > BALANCE:
             balance = whole.balance(near.parts, near.corners, whole.weights[near.parts])
             fallen = self._proved_fall(near, balance) if not balance.stands else 0
             if fallen:
@@ -259,9 +259,8 @@ class Stability:
         whole = self.equilibrium
         at = question.corners
         lift = np.einsum("ke,ke->k", whole.lift[at], forces[at])
-        patch, first = np.unique(whole.patch[at], return_index=True)
+        first = np.flatnonzero(np.diff(whole.patch[at], prepend=-1))
         lift = np.add.reduceat(lift, first) if len(first) else lift
-        del patch
         a, b = whole.a[at[first]], whole.b[at[first]]
         down = lift > 0
         upper, lower = np.where(down, a, b), np.where(down, b, a)
