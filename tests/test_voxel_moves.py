@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 
 import neurosym as ns
 from neurosym.errors import InputError
+from neurosym.geometry import voxel_moves
 from neurosym.geometry.grid import GridCells, cells_of
 from neurosym.geometry.voxel_moves import (
     DIRECTIONS,
@@ -330,3 +331,28 @@ def test_another_part_makes_way_for_the_one_that_is_wanted():
     assert isinstance(found, Separation)
     assert found.group == wanted
     assert found.level == 2
+
+
+@given(puzzles(), st.booleans())
+@settings(max_examples=40, deadline=None)
+def test_many_parts_are_answered_as_few_are(cells, fixed):
+    if len(cells) < 2:
+        return
+    full, held = (1 << len(cells)) - 1, int(fixed)
+    few = first_separation(grid(cells), full, fixed=held)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(voxel_moves, "FEW", 1)
+        many = first_separation(grid(cells), full, fixed=held)
+    assert type(many) is type(few)
+    if isinstance(few, Separation) and isinstance(many, Separation):
+        assert (many.level, many.group) == (few.level, few.group)
+    else:
+        assert many == few
+
+
+def test_a_wall_of_hundreds_of_bricks_is_answered_at_once():
+    cells = {f"{x} {z}": [(2 * x + z % 2 + k, 0, z) for k in (0, 1)] for x in range(20) for z in range(20)}
+    found = first_separation(grid(cells), (1 << len(cells)) - 1)
+    assert isinstance(found, Separation)
+    assert found.level == 1
+    assert found.group.bit_count() == 1

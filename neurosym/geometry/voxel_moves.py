@@ -25,11 +25,14 @@ Rotations are not searched.
 from __future__ import annotations
 
 import time
+from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from neurosym.errors import InputError
 from neurosym.geometry.blocking import bits
@@ -41,6 +44,9 @@ DIRECTIONS = ((1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1
 
 #: No obstacle ahead, however far.
 ENDLESS = 1 << 30
+
+#: Up to so many parts, pairs and closures are looked at one by one, which is quicker than arrays are.
+FEW = 24
 
 #: An offset (x, y, z) is one number, x + y * RADIX + z * RADIX**2: differences of offsets are differences of numbers.
 RADIX = 1 << 16
@@ -273,8 +279,9 @@ class _Search:
         self.count = len(self.masks)
         self.all = (1 << self.count) - 1
         self.pairs = [(i, j) for i in range(self.count) for j in range(i + 1, self.count)]
-        self.lines = {pair: _Lines(self.bodies[pair[0]], self.bodies[pair[1]]) for pair in self.pairs}
+        self.lines: dict[tuple[int, int], _Lines] = {}
         self.bounds = [(b.min(axis=0), b.max(axis=0) + 1) for b in self.bodies]
+        self.low, self.high = (np.array(ends) for ends in zip(*self.bounds))
         # What a step along each direction adds to a height, and how far above the ground each part begins.
         self.rise = [float(cells.shift(np.array(d))[2]) for d in DIRECTIONS]
         self.clearance: list[float] | None = None
@@ -329,10 +336,12 @@ class _Search:
     def _drives(self, state: tuple[int, ...]) -> list[list[tuple[int, int, int]]]:
         """For each direction: (gap, i, j) wherever part i, going that way, meets part j."""
         found: list[list[tuple[int, int, int]]] = [[], [], [], [], [], []]
-        for pair in self.pairs:
+        for pair in self.pairs if self.count <= FEW else self._facing(state):
             i, j = pair
-            gaps = self.lines[pair].gaps(state[j] - state[i])
-            for d, gap in gaps:
+            lines = self.lines.get(pair)
+            if lines is None:
+                lines = self.lines[pair] = _Lines(self.bodies[i], self.bodies[j])
+            for d, gap in lines.gaps(state[j] - state[i]):
                 found[d].append((gap, i, j))
                 found[d ^ 1].append((gap, j, i))
         if self.clearance is not None:
@@ -342,6 +351,14 @@ class _Search:
                         height = self.clearance[i] + float(self.cells.shift(np.array(_decoded(state[i])))[2])
                         found[d].append((int(height / -rise), i, 0))
         return found
+
+    def _facing(self, state: tuple[int, ...]) -> list[tuple[int, int]]:
+        """Pairs whose bounds, seen along some axis, cover one another: no others can meet along it."""
+        offsets = np.array([_decoded(at) for at in state])
+        low, high = self.low + offsets, self.high + offsets
+        across = (low[:, None] < high[None]) & (high[:, None] > low[None])
+        first, second = np.nonzero(np.triu(across.sum(axis=2) >= 2, 1))
+        return list(zip(first.tolist(), second.tolist()))
 
     def _closures(self, drives: list[tuple[int, int, int]], steps: int, reference: int) -> Iterator[int]:
         """Of each part outside `reference`, the parts that go along when it goes `steps`; those that drive the
@@ -375,9 +392,24 @@ class _Search:
     def _leaving(self, edges: list[list[tuple[int, int, int]]]) -> Iterator[tuple[int, int]]:
         """(direction, group) for the smallest groups that can leave; all of them move relative to fixed parts."""
         for d in range(6):
-            for group in self._closures(edges[d], ENDLESS, 1 if self.fixed else 0):
+            few = self.count <= FEW or self.accept is not None
+            groups = self._closures(edges[d], ENDLESS, 1 if self.fixed else 0) if few else self._last(edges[d])
+            for group in groups:
                 if group != self.all and (self.accept is None or self.accept(self._parts(group))):
                     yield d, group
+
+    def _last(self, drives: list[tuple[int, int, int]]) -> Iterator[int]:
+        """The strongly connected groups that drive no others: the smallest closure of any direction is one of them."""
+        rows, columns = np.array([i for _, i, _ in drives], dtype=int), np.array([j for _, _, j in drives], dtype=int)
+        graph = coo_array((np.ones(len(rows), dtype=bool), (rows, columns)), shape=(self.count, self.count))
+        number, label = connected_components(graph, connection="strong")
+        drivers = set(label[rows][label[rows] != label[columns]].tolist())
+        groups = dict.fromkeys(range(number), 0)
+        for part, of in enumerate(label.tolist()):
+            groups[of] |= 1 << part
+        for of, group in groups.items():
+            if of not in drivers and not (self.fixed and group & 1):
+                yield group
 
     def _moves(self, edges: list[list[tuple[int, int, int]]]) -> Iterator[tuple[int, int, int]]:
         """(direction, steps, group) for all moves: unions of closures."""
@@ -435,14 +467,12 @@ class _Lines:
     """How far one part can go before it meets another, for any relative offset; answers are kept."""
 
     def __init__(self, a: NDArray[np.int64], b: NDArray[np.int64]) -> None:
-        differences = np.unique((b[None] - a[:, None]).reshape(-1, 3), axis=0)
-        self._ahead: list[dict[tuple[int, int], NDArray[np.int64]]] = []
-        for axis in range(3):
-            others = [k for k in range(3) if k != axis]
-            lines: dict[tuple[int, int], list[int]] = {}
-            for row in differences.tolist():
-                lines.setdefault((row[others[0]], row[others[1]]), []).append(row[axis])
-            self._ahead.append({line: np.array(sorted(at)) for line, at in lines.items()})
+        differences = {(x, y, z) for x, y, z in (b[None] - a[:, None]).reshape(-1, 3).tolist()}
+        self._ahead: list[dict[tuple[int, int], list[int]]] = [{}, {}, {}]
+        for x, y, z in sorted(differences):
+            self._ahead[0].setdefault((y, z), []).append(x)
+            self._ahead[1].setdefault((x, z), []).append(y)
+            self._ahead[2].setdefault((x, y), []).append(z)
         self._known: dict[int, list[tuple[int, int]]] = {}
 
     def gaps(self, offset: int) -> list[tuple[int, int]]:
@@ -453,16 +483,17 @@ class _Lines:
         return known
 
     def _asked(self, offset: Offset) -> Iterator[tuple[int, int]]:
-        for axis in range(3):
-            b, c = (k for k in range(3) if k != axis)
-            line = self._ahead[axis].get((-offset[b], -offset[c]))
-            if line is None:
+        x, y, z = offset
+        for axis, (line, here) in enumerate((((-y, -z), -x), ((-x, -z), -y), ((-x, -y), -z))):
+            # Sorted, since the differences were: x first, then y, then z.
+            at = self._ahead[axis].get(line)
+            if at is None:
                 continue
-            at = line + offset[axis]
-            if (at > 0).any():
-                yield 2 * axis, int(at[at > 0].min()) - 1
-            if (at < 0).any():
-                yield 2 * axis + 1, int(-at[at < 0].max()) - 1
+            after, before = bisect_right(at, here), bisect_left(at, here)
+            if after < len(at):
+                yield 2 * axis, at[after] - here - 1
+            if before:
+                yield 2 * axis + 1, here - at[before - 1] - 1
 
 
 def _decoded(number: int) -> Offset:
