@@ -45,9 +45,10 @@ LIGHTEST = 1e-6
 PROOF = 10.0
 
 #: Weights of the proximal term, step by step: the first few, and those that follow where these do not decide.
-QUICK = (1e-2, 1e-4, 1e-6)
+QUICK = (1e-2, 1e-4, 1e-6, 1e-6)
 THOROUGH = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-6, 1e-7, 1e-8)
 _NEWTON_STEPS = 40
+_SMALLEST_SHARE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,12 +204,14 @@ class _Newton:
             gradient = weight * z - self.target + self.B @ (f @ self.edges.T).ravel()
             if np.abs(gradient).max(initial=0.0) <= tolerance:
                 break
-            step = -self._solve(f > 0, weight, gradient)
+            # With no force at all every edge is on the verge of carrying one.
+            active = f > 0 if f.any() else np.ones(f.shape, dtype=bool)
+            step = -self._solve(active, weight, gradient)
             slope = float(gradient @ step)
             share = 1.0
             while True:
                 then, g = value(z + share * step)
-                if then <= now + 1e-4 * share * slope or share < 1e-6:
+                if then <= now + 1e-4 * share * slope or share < _SMALLEST_SHARE:
                     break
                 share /= 2
             if not then < now:
