@@ -5,6 +5,7 @@
     ├── InputError                  an argument, a file or a picture is not what was asked for
     │   ├── UnknownNameError        a name that nothing is registered under; lists those there are
     │   ├── AssemblyError           parts that overlap, float, fall apart or are empty
+    │   │   └── FaultyPartsError    all that is wrong with the parts of a file, part by part (neurosym.geometry.notes)
     │   ├── DemonstrationError      demonstrations whose arrays do not fit together
     │   └── CheckpointError         a weights file of another make, or damaged
     ├── ContractError               a plug-in broke its promise (a planner's plan fails its replay)
