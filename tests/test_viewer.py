@@ -768,6 +768,24 @@ def test_the_prior_and_the_search_are_there_to_read(tab, viewer, shown):
     tab.get_by_text(shown.search.refusals[0].reason).first.wait_for()
 
 
+def test_a_refusal_shows_what_stood_in_the_way(viewer, shown):
+    viewer.show(shown)
+    refusal = shown.search.refusals[0]
+    own = dict(zip(shown.timeline.names, [tuple(part.color) for part in viewer.scene.parts]))
+    viewer.refusal.value = 1
+    colours = dict(zip(shown.timeline.names, [tuple(part.color) for part in viewer.scene.parts]))
+    assert {n for n, c in colours.items() if c == panels.REFUSED} == {refusal.action}
+    assert {n for n, c in colours.items() if c == panels.BECAUSE} == set(refusal.because) - {refusal.action}
+    assert refusal.reason in viewer.refusal_said.content
+    if shown.search.steps[: len(refusal.after)] == refusal.after:
+        assert viewer.slider.value == len(refusal.after)
+    viewer._clicked("T")
+    assert viewer.refusal.value == 0
+    viewer._clicked("T")
+    assert viewer.part.value == "(no part)"
+    assert dict(zip(shown.timeline.names, [tuple(part.color) for part in viewer.scene.parts])) == own
+
+
 def test_bad_input_shows_a_message(tab, viewer):
     tab.get_by_role("tab", name="Plan again").click()
     for number, said in (("nonsense", "whole number"), ("999", "0 to 239")):

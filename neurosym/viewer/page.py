@@ -52,7 +52,7 @@ class Page:
         self._step_shown: tuple[int | None, int] | None = None
         self._facts_for: tuple[str, tuple[str, ...]] | None = None
         self._closed = threading.Event()
-        self.scene = PlanScene(server, self._picked)
+        self.scene = PlanScene(server, self._clicked)
         self._build()
         self._clock = threading.Thread(target=self._run, name="neurosym view", daemon=True)
         self._clock.start()
@@ -118,6 +118,8 @@ class Page:
         with tabs.add_tab("Prior"):
             self.prior_tab = gui.add_html("")
         with tabs.add_tab("Search"):
+            self.refusal = gui.add_slider("Look at", min=0, max=1, step=1, initial_value=0, hint="a refusal, by number")
+            self.refusal_said = gui.add_html("")
             self.search_tab = gui.add_html("")
         with tabs.add_tab("Part"):
             self.part = gui.add_dropdown("Part", (NO_PART,))
@@ -128,6 +130,7 @@ class Page:
         self.play.on_click(lambda _: self._toggle())
         self.names.on_update(lambda _: self.scene.name_parts(self.names.value))
         self.part.on_update(lambda _: self._picked(self.part.value))
+        self.refusal.on_update(lambda _: self._look_at(self.refusal.value))
 
     def _build_form(self) -> None:
         gui, query = self.server.gui, self.query
@@ -161,6 +164,9 @@ class Page:
             + panels.pictures(shown.pictures)
         )
         self.search_tab.content = panels.styled(panels.refusals(search))
+        self.refusal.max, self.refusal.disabled = max(len(search.refusals), 1), not search.refusals
+        _assign(self.refusal, 0)
+        self.refusal_said.content = ""
         self._step_shown = self._facts_for = None
 
     # -- the film ---------------------------------------------------------------------------------------------
@@ -196,15 +202,45 @@ class Page:
         self.play.icon = viser.Icon.PLAYER_PAUSE if playing else viser.Icon.PLAYER_PLAY
 
     def _picked(self, name: str) -> None:
-        """A part was clicked or chosen; a click on the one that is chosen lets go of it."""
+        """A part was chosen."""
         with self._lock:
-            chosen = None if name == NO_PART else name
             if self.part.value != name:
                 _assign(self.part, name)  # which calls this again
                 return
-            self.scene.pick(chosen)
+            if name != NO_PART:
+                _assign(self.refusal, 0)
+            self.scene.stand_out(None if name == NO_PART else {name: None})
             self._facts_for = None
             self._tell_facts()
+
+    def _clicked(self, name: str) -> None:
+        """A part was clicked; a click on the one that is chosen lets go of it."""
+        self._picked(NO_PART if self.part.value == name else name)
+
+    def _look_at(self, number: int) -> None:
+        """Show refusal `number`, from 1: what was tried and what stood in the way; 0 ends it."""
+        with self._lock:
+            shown = self.shown
+            if shown is None or not 0 <= number <= len(shown.search.refusals):
+                return
+            if number == 0:
+                self.refusal_said.content = ""
+                if self.part.value == NO_PART:
+                    self.scene.stand_out(None)
+                return
+            _assign(self.part, NO_PART)
+            refusal = shown.search.refusals[number - 1]
+            self.refusal_said.content = panels.styled(panels.looked_at(number, refusal))
+            timeline = shown.timeline
+            if timeline is None:
+                return
+            depth = len(refusal.after)
+            if shown.search.steps[:depth] == refusal.after:
+                self._play(False)
+                _assign(self.slider, float(depth))
+            colours: dict[str, tuple[int, int, int] | None] = dict.fromkeys(refusal.because, panels.BECAUSE)
+            tried = {m.action: m.parts for m in timeline.staging.motions}.get(refusal.action, (refusal.action,))
+            self.scene.stand_out(colours | dict.fromkeys(tried, panels.REFUSED))
 
     def _tell_facts(self) -> None:
         timeline = self.shown.timeline if self.shown else None

@@ -33,6 +33,9 @@ MOST_ROWS = 40
 #: Width of a table of scores (CSS pixels), as wide as the panel beside the view.
 WIDTH = 360
 
+#: Colours (0..255) of what was refused, and of what the refusal is due to.
+REFUSED, BECAUSE = (213, 94, 0), (0, 114, 178)
+
 #: Okabe and Ito's blue for probability, and vermilion for what was taken.
 _INK, _TAKEN = np.array([0, 90, 140]), "#D55E00"
 
@@ -121,7 +124,7 @@ def refusals(search: Search) -> str:
         if on_path[:depth] == refusal.after:
             rows.extend(_kept(i, on_path[i]) for i in range(done, depth))
             done = max(done, depth)
-        rows.append(_refused(number, refusal))
+        rows.append(refused(number, refusal))
     left = len(search.refusals) - MOST_REFUSALS
     if left > 0:
         rows.append(f"<p class='note'>… and {left:,} more refusals.</p>")
@@ -133,11 +136,23 @@ def _kept(step: int, action: str) -> str:
     return f"<p style='margin:2px 0;color:#00724f'><b>✔ {step + 1}. {escape(action)}</b></p>"
 
 
-def _refused(number: int, refusal: Refusal) -> str:
+def refused(number: int, refusal: Refusal) -> str:
+    """One refused attempt, with its reason."""
     after = escape(", ".join(refusal.after)) or "nothing"
     return (
         f"<p style='margin:2px 0 2px 14px'><span style='color:#b04a00'>✘ {number}. not <b>{escape(refusal.action)}</b>"
         f"</span> <span class='quiet'>after {after}</span><br>{escape(refusal.reason)}</p>"
+    )
+
+
+def looked_at(number: int, refusal: Refusal) -> str:
+    """The refusal that the 3D view shows, and what its colours mean."""
+    legend = "in the view: <b style='color:#d55e00'>what was refused</b>"
+    if refusal.because:
+        legend += ", <b style='color:#0072b2'>what it is due to</b>"
+    return (
+        "<div style='border-left:4px solid #0072B2;background:#eef5fa;color:#222;padding:4px 8px'>"
+        f"{refused(number, refusal)}<span class='quiet'>{legend}</span></div>"
     )
 
 

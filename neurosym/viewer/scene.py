@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import colorsys
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from neurosym.viewer.solids import solids
 from neurosym.viewer.timeline import Timeline, floor_of
 
 Array = NDArray[np.float64]
+RGB = tuple[int, int, int]
 
 #: The largest extent of the work in the scene: cameras, lines and light need no thought of millimetres or metres.
 SIZE = 2.0
@@ -72,7 +73,8 @@ class PlanScene:
         self._outlines: dict[str, viser.LineSegmentsHandle] = {}
         self._way: viser.LineSegmentsHandle | None = None
         self._way_of: int | None = None
-        self._picked: str | None = None
+        self._standing_out: Mapping[str, RGB | None] | None = None
+        self._colours: list[RGB] = []
         server.scene.set_up_direction("+z")
         server.scene.configure_default_lights(enabled=True, cast_shadow=True)
 
@@ -80,8 +82,8 @@ class PlanScene:
         """Show another timeline from its beginning, or nothing."""
         with self.server.atomic():
             self.server.scene.remove_by_name("/work")
-            self.timeline, self._picked, self._way, self._way_of = timeline, None, None, None
-            self.parts, self._names, self._outlines = [], [], {}
+            self.timeline, self._standing_out, self._way, self._way_of = timeline, None, None, None
+            self.parts, self._names, self._outlines, self._colours = [], [], {}, []
             if timeline is not None:
                 self._add(timeline)
                 self.show(0.0)
@@ -96,13 +98,14 @@ class PlanScene:
         for i, solid in enumerate(solids(assembly)):
             name = assembly.names[i]
             own = FIXED if name in assembly.fixed else part_colour(i, len(assembly))
-            colour = timeline.staging.colours.get(name, own)
+            r, g, b = (round(255 * c) for c in timeline.staging.colours.get(name, own))
+            self._colours.append((r, g, b))
             middle = timeline.centres[i]
             node = scene.add_mesh_simple(
                 f"/work/{i}",
                 (solid.vertices - middle) * self.scale,
                 solid.faces,
-                color=colour,
+                color=(r, g, b),
                 flat_shading=True,
             )
             outline = (solid.outline - middle) * self.scale
@@ -209,18 +212,20 @@ class PlanScene:
             pieces = np.stack([way[:-1], way[1:]], axis=1)
             self._way = self.server.scene.add_line_segments("/work/way", pieces, _PICKED, thickness=0.008 * SIZE)
 
-    def pick(self, name: str | None) -> None:
-        """Let one part stand out, or none."""
+    def stand_out(self, colours: Mapping[str, RGB | None] | None) -> None:
+        """Let parts stand out, each in a colour (0..255) or, with None, its own, the others faint; None ends it."""
         timeline = self.timeline
-        if timeline is None or name == self._picked:
+        if timeline is None or colours == self._standing_out:
             return
-        self._picked = name
+        self._standing_out = colours
         with self.server.atomic():
-            for own, node in zip(timeline.names, self.parts):
-                node.opacity = None if name is None or own == name else FAINT
-            for own, edges in self._outlines.items():
-                # Of few parts the outlines say what is where; of many they would hide the one.
-                edges.visible = name is None or own == name or len(self.parts) <= MOST_NAMES
+            for name, node, own in zip(timeline.names, self.parts, self._colours):
+                chosen = colours is None or name in colours
+                node.opacity = None if chosen else FAINT
+                node.color = (colours or {}).get(name) or own
+                # Of few parts the outlines say what is where; of many they would hide those that stand out.
+                if name in self._outlines:
+                    self._outlines[name].visible = chosen or len(self.parts) <= MOST_NAMES
 
     def name_parts(self, visible: bool) -> None:
         """Show or hide the parts' names."""
