@@ -106,7 +106,8 @@ class AssemblyFamily(ProblemFamily):
         if len(assembly.fixed) == len(assembly):
             raise InputError(f"Expected a part that is not fixed, to take out; all {len(assembly)} are. Fix fewer.")
         vectors = directions_for(assembly, directions)
-        setting = Setting(tuple(map(tuple, vectors.tolist())), paths, bool(groups), bool(gravity), int(held) if gravity else 0)
+        hands = int(held) if gravity else 0
+        setting = Setting(tuple(map(tuple, vectors.tolist())), paths, bool(groups), bool(gravity), hands)
         details = {
             "directions": directions if isinstance(directions, str | int) else vectors.tolist(),
             "ground": assembly.ground if assembly.has_table else None,

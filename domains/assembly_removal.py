@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from neurosym import predicates
 from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.blocking import bits
 from neurosym.geometry.sweep import exits_along
-from neurosym.language import Action, Derived, Domain, Fluent, Problem, Simulation, State, Type
+from neurosym.language import Action, Derived, Domain, Fluent, Problem, Simulation, State, Type, formulas
 from neurosym.problem import Verdict
 from neurosym.ways import Way
 from neurosym.why_not import GROUND, listed
@@ -54,8 +55,8 @@ def apart_one_by_one(
         family=family,
         simulation=Simulation("rigid", {n: n for n in loose}) if judged_alike else None,
         details=details,
-        explain=lambda result: explain_removal(assembly, setting, pairs, result),
-        refute=lambda: refute_removal(assembly, setting),
+        explain=partial(explain_removal, assembly, setting, pairs),
+        refute=partial(refute_removal, assembly, setting),
     )
 
 
@@ -95,7 +96,7 @@ def can_leave(setting: Setting) -> Derived:
             return Verdict(False, tuple(n for n in names if n != GROUND), f"{p} cannot go {how}: {listed(names)}.")
         return Verdict(True, (), f"{p} is free {how}.", how=how)
 
-    return Derived("free", [part], ask, check=check)
+    return Derived("free", [part], ask, check=check, formula=straight.formula if setting.paths == "straight" else None)
 
 
 def stands_at_first(setting: Setting) -> Derived:
@@ -112,4 +113,9 @@ def stands_at_first(setting: Setting) -> Derived:
         said = f"The assembly does not stand as it is: {listed(falling)} would fall."
         return Verdict(False, falling, said, ())
 
-    return Derived("stands", [], ask)
+    def formula(world: Assembly) -> formulas.AnyOf:
+        if world.stability().standing_when_held((1 << len(world)) - 1, setting.held).stands:
+            return formulas.AnyOf((formulas.Way("", ()),))
+        return formulas.AnyOf(tuple(formulas.Way(f"after {n}", (~present(n),)) for n in world.names))
+
+    return Derived("stands", [], ask, formula=formula)
