@@ -21,8 +21,9 @@ from neurosym.errors import DefinitionError
 from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.blocking import bits
 from neurosym.geometry.sweep import exits_along
+from neurosym.language import formulas
 from neurosym.language.state import State
-from neurosym.language.terms import Atom, Derived, Fluent, Type
+from neurosym.language.terms import Atom, Derived, Fluent, Literal, Type
 from neurosym.problem import Verdict
 from neurosym.ways import Way
 from neurosym.why_not import listed
@@ -70,7 +71,16 @@ def free(
         said = f"{p} is blocked in every direction ({said})."
         return Verdict(False, world.in_mask(because), said, until, unconditional=True)
 
-    return Derived("free", [part], ask)
+    def formula(world: Assembly, p: str) -> formulas.AnyOf:
+        graph = world.blocking(directions)
+        ways = []
+        for d in range(len(graph.directions)):
+            if not (table and graph.into_table[d]):
+                blockers = world.in_mask(graph.by_part[d][world.index[p]])
+                ways.append(formulas.Way(f"along {graph.describe(d)}", tuple(~present(n) for n in blockers)))
+        return formulas.AnyOf(tuple(ways))
+
+    return Derived("free", [part], ask, formula=formula)
 
 
 def interlocked(present: Fluent, *, directions: ArrayLike | None = None, table: bool = True) -> Derived:
@@ -103,7 +113,15 @@ def supported(present: Fluent, *, removal: bool = True) -> Derived:
         lost = world.in_mask(stability.supports[number])
         return Verdict(False, lost, f"{p} has lost {', '.join(lost) or 'nothing'} under it.", () if removal else None)
 
-    return Derived("supported", [part], ask)
+    def formula(world: Assembly, p: str) -> formulas.AnyOf:
+        stability = world.stability()
+        number = world.index[p]
+        if stability.on_table >> number & 1:
+            return formulas.AnyOf((formulas.Way("on the table", ()),))
+        carriers = world.in_mask(stability.supports[number])
+        return formulas.AnyOf(tuple(formulas.Way(f"on {n}", (Literal(present(n)),)) for n in carriers))
+
+    return Derived("supported", [part], ask, formula=formula)
 
 
 def stable_without(present: Fluent, *, removal: bool = True, held: int = 0) -> Derived:
@@ -130,7 +148,10 @@ def stable_without(present: Fluent, *, removal: bool = True, held: int = 0) -> D
             return Verdict(True, (), f"The others stand without {p}.", how=how)
         return ask(world, state, p) if not hands else _falls(world, world.stability().standing(rest).moving, (p,), held)
 
-    return Derived("stable_without", [part], ask, check=check)
+    def formula(world: Assembly, p: str) -> formulas.Stands:
+        return formulas.Stands(present, p, held)
+
+    return Derived("stable_without", [part], ask, check=check, formula=formula)
 
 
 def stands(world: Assembly, rest: int, leaving: Sequence[str], present: Fluent | None = None, held: int = 0) -> Verdict:

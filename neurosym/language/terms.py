@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from neurosym.errors import DefinitionError
 from neurosym.problem import Verdict
+
+if TYPE_CHECKING:
+    from neurosym.language.formulas import Formula
 
 
 @dataclass(frozen=True)
@@ -114,9 +117,11 @@ class Derived(_Predicate):
         check: for answers that are found by a search and say `how`: takes the world, the state, the `how` of a step and
             the names of the objects, and answers whether it may be done so. Replays of a plan that says how ask it
             instead of `function`: what was found once need not be found again, but must hold.
+        formula: takes the world and the names of the objects, and says for all states at once when it holds (None: it
+            cannot say). Whoever writes the problem down for other programs asks it.
     """
 
-    __slots__ = ("check", "function")
+    __slots__ = ("check", "formula", "function")
 
     def __init__(
         self,
@@ -125,10 +130,12 @@ class Derived(_Predicate):
         function: Callable[..., Verdict],
         *,
         check: Callable[..., Verdict] | None = None,
+        formula: Callable[..., Formula | None] | None = None,
     ) -> None:
         super().__init__(name, types)
         self.function = function
         self.check = check
+        self.formula = formula
 
 
 def derived(*types: Type) -> Callable[[Callable[..., Verdict]], Derived]:
