@@ -200,6 +200,27 @@ def test_two_pairs_come_apart_in_groups_only(gravity):
     assert set(fixed.how[0].parts) == {"c", "d"}
 
 
+@pytest.mark.parametrize("gravity", [False, True])
+def test_the_anchor_may_leave_what_stays(gravity):
+    """A hood over a block: the hood goes up, though it is the anchor and the block is what the action names."""
+    hood = {"hood": without(box((0, 3), (0, 3), (0, 3)), (1, 1, 0), (1, 1, 1)), "core": [(1, 1, 0), (1, 1, 1)]}
+    problem = made(hood, groups=True, directions="+z", gravity=gravity)
+    assert problem.details["anchor"] == ["hood"]
+    result = ns.solve(problem)
+    assert (result.plan, result.how[0].parts) == (("core",), ("hood",))
+    assert ns.validate(problem, result.plan)
+    assert ns.solve(made(hood, groups=True, directions="+z", gravity=gravity, fixed=["hood"])).status is UNSOLVABLE
+
+
+def test_a_group_takes_along_what_would_fall():
+    """Without a post the beam would fall, so it goes with the post."""
+    problem = made(GATE, groups=True, before=[("post 0", "beam")], fixed=["post 1"])
+    result = ns.solve(problem)
+    assert result.solved
+    assert set(result.how[0].parts) == {"post 0", "beam"}
+    assert ns.validate(problem, result.plan, result.how)
+
+
 def test_a_ball_in_a_bent_tunnel_takes_two_moves():
     for options in ({}, {"groups": True}):
         assert ns.solve(made(BENT, gravity=False, **options)).status is UNSOLVABLE
