@@ -1,8 +1,9 @@
-"""Meshes that are not convex, as convex pieces for a simulator that moves nothing else: V-HACD, which PyBullet brings.
+"""Meshes that are not convex, as convex pieces for a simulator that moves nothing else.
 
-The pieces approximate the mesh on a voxel grid: they fill narrow hollows and round off what is thinner than a voxel.
-So a part in a snug hole may be pressed by its neighbours where the real one is not; settle first, and read small
-displacements of such parts with that in mind. A static part needs none of this: it collides as the mesh it is.
+Joints, frames and whatever else has few inner edges are cut exactly (`neurosym.simulation.cutting`). What would fall
+into too many pieces goes to V-HACD, which PyBullet brings and which approximates: measured on a channel of volume 5,
+its pieces have 5.9, and the hollow is half filled. So a part in a snug or curved hole may be pressed by its neighbours
+where the real one is not. A part that never moves needs none of this: it collides as the mesh it is.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 
 from neurosym.errors import AssemblyError
 from neurosym.simulation.client import pybullet, without_output
+from neurosym.simulation.cutting import cut_into_convex
 
 Array = NDArray[np.float64]
 
@@ -34,8 +36,12 @@ def convex_pieces(name: str, vertices: Array, faces: NDArray[np.int64]) -> list[
         faces: int64 (m, 3).
 
     Raises:
-        AssemblyError: V-HACD finds nothing in the mesh.
+        AssemblyError: neither way finds any piece in the mesh.
     """
+    return cut_into_convex(vertices, faces) or _by_vhacd(name, vertices, faces)
+
+
+def _by_vhacd(name: str, vertices: Array, faces: NDArray[np.int64]) -> list[Array]:
     # It works in single precision and expects lengths of about one.
     low, span = vertices.min(axis=0), float(np.ptp(vertices, axis=0).max())
     scaled = (vertices - low) / span

@@ -8,8 +8,9 @@ Parts are rigid, under gravity, on the table, and the scene is scaled until a ty
 * pulled: a grip drags the part along the path against friction and whatever it meets. What lies on a part that is
   pulled out sideways comes along, as it would on a real table; geometry alone does not say so.
 
-What simulates well: boxes, convex bodies. A mesh that is not convex is taken apart by V-HACD, approximately (see
-`neurosym.simulation.decomposition`); a fixed part collides exactly as it is.
+What simulates well: boxes, convex bodies, and meshes with few inner edges, which are cut into convex pieces exactly. A
+mesh with a curved hollow is taken apart by V-HACD, approximately (see `neurosym.simulation.decomposition`); a fixed
+part collides exactly as it is.
 """
 
 from __future__ import annotations

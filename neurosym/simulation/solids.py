@@ -20,12 +20,12 @@ from neurosym.geometry.assembly import Assembly, Body, Box, Part
 
 Array = NDArray[np.float64]
 BodiesKind = Literal["parts", "cubes"]
-#: What to do with meshes that are not convex: refuse them, or take them apart by V-HACD.
+#: What to do with meshes that are not convex: refuse them, or take them apart into convex pieces.
 MeshesKind = Literal["refuse", "decompose"]
 
 #: A mesh that fills its convex hull to this share is taken as the hull: CAD facets are rarely exactly convex.
 CONVEX_FILL = 1 - 1e-3
-#: The same where meshes may be decomposed, as V-HACD's pieces are no nearer to such a mesh than its hull is.
+#: The same where meshes may be decomposed: facets of a curved face would give hundreds of pieces, for nothing.
 NEARLY_CONVEX_FILL = 0.95
 
 

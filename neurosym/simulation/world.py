@@ -86,7 +86,7 @@ class World:
         physics: friction, gravity and the solver's numbers.
         ground: height of the table; None takes the assembly's own, which may be none at all.
         present: names of the parts that are there; None means all.
-        meshes: whether meshes that are not convex are refused, or taken apart into convex pieces (V-HACD).
+        meshes: whether meshes that are not convex are refused, or taken apart into convex pieces.
         window: show it in PyBullet's own window.
 
     The assembly's fixed parts never move, whatever their shape.

@@ -1,0 +1,371 @@
+"""Replays in PyBullet: what stands still, what falls, what is in the way, and files that are no plans."""
+
+from __future__ import annotations
+
+import json
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial import ConvexHull
+from scipy.spatial.transform import Rotation
+
+import neurosym as ns
+from neurosym.cli import main
+from neurosym.errors import InputError, UnknownNameError
+from neurosym.geometry.assembly import Body, Box, Mesh, Part
+from neurosym.motions import Motion, Staging, building, pose_along, stage, steps_in_space
+from neurosym.plan_files import read_plan
+from neurosym.simulation import World, open_clients, replay_plan, replay_staging
+from neurosym.simulation.cutting import cut_into_convex
+from neurosym.simulation.decomposition import convex_pieces
+from neurosym.simulation.solids import rigid_bodies
+from neurosym.ways import Way
+
+BEAM = {"post": [(0, 0, 0)], "beam": [(0, 0, 1), (1, 0, 1)], "weight": [(0, 0, 2)]}
+BOX_WITH_LID = {
+    "box": [(x, y, z) for x in range(3) for y in range(3) for z in range(2) if (x, y, z) != (1, 1, 1)],
+    "core": [(1, 1, 1)],
+    "lid": [(x, y, 2) for x in range(3) for y in range(3)],
+}
+SOMA = ns.load_domain("soma")
+
+
+def removal(cells, plan, how=(), *, size=1.0, **options):
+    assembly = cells if isinstance(cells, ns.Assembly) else ns.Assembly.from_cells(cells, size)
+    motions = steps_in_space(assembly, assembly.names, plan, [[name] for name in plan], how)
+    return replay_staging(Staging(assembly, assembly.names, motions), **options)
+
+
+def call(*arguments) -> int:
+    with pytest.raises(SystemExit) as left:
+        main([str(a) for a in arguments])
+    return int(left.value.code or 0)
+
+
+# -- motions ----------------------------------------------------------------------------------------------------
+
+
+@given(
+    st.lists(st.tuples(*[st.floats(-3, 3)] * 6), min_size=1, max_size=4),
+    st.tuples(*[st.floats(-2, 2)] * 3),
+    st.floats(0, 1),
+)
+@settings(max_examples=60, deadline=None)
+def test_a_motion_begins_at_rest_ends_at_its_end_and_carries_its_centre_straight(poses, centre, share):
+    path = np.tile(np.eye(4), (len(poses) + 1, 1, 1))
+    for X, (x, y, z, *turn) in zip(path[1:], poses):
+        X[:3, :3], X[:3, 3] = Rotation.from_rotvec(turn).as_matrix(), (x, y, z)
+    motion = Motion("go", ("a",), path, centre=np.array(centre))
+    assert np.allclose(motion.at(0), np.eye(4))
+    assert np.allclose(motion.at(1), path[-1], atol=1e-9)
+    back = Motion("come", ("a",), path, arrives=True, centre=np.array(centre))
+    assert np.allclose(back.at(share), motion.at(1 - share))
+    X = pose_along(path, share, centre)
+    at = X[:3, :3] @ centre + X[:3, 3]
+    ends = path[:, :3, :3] @ centre + path[:, :3, 3]
+    off = [
+        np.linalg.norm(at - (a + np.clip((at - a) @ (b - a) / max((b - a) @ (b - a), 1e-12), 0, 1) * (b - a)))
+        for a, b in pairwise(ends)
+    ]
+    assert min(off) < 1e-6
+
+
+def test_a_plan_in_space_says_who_is_there_before_each_step():
+    problem = SOMA.problem(17, collapse="rigid", removed=["V"])
+    result = ns.solve(problem)
+    staging = stage(problem, result.plan, result.how)
+    left = [n for n in problem.world.names if n != "V"]
+    for i, name in enumerate(result.plan):
+        assert staging.there(i) == tuple(left)
+        assert np.allclose(staging.motions[i].path[1, :3, :3], np.eye(3))
+        assert staging.motions[i].given
+        left.remove(name)
+    assert staging.there(len(result.plan)) == ()
+
+
+def test_a_plan_backwards_arrives_along_the_same_lines():
+    problem = ns.load_domain("assembly").problem(0)
+    result = ns.solve(problem)
+    out = stage(problem, result.plan, result.how)
+    back = stage(problem, result.reversed(), result.reversed().how)
+    assert set(back.present) == set(out.there(len(out.motions)))
+    for one, other in zip(out.motions, back.motions[::-1]):
+        assert other.arrives
+        assert one.parts == other.parts
+        assert np.allclose(one.at(0.3), other.at(0.7))
+
+
+def test_problems_without_parts_in_space_are_refused_with_a_remedy():
+    letter = ns.Type("letter")
+    sent = ns.Fluent("sent", letter)
+    x = letter("x")
+    post = ns.Domain("post", fluents=[sent], actions=[ns.Action("send", x, pre=[~sent(x)], eff=[sent(x)])])
+    problem = post.problem(objects={letter: ["one"]}, init=[], goal=[sent("one")])
+    with pytest.raises(InputError, match="simulation=Simulation"):
+        replay_plan(problem, problem.actions)
+    with pytest.raises(UnknownNameError, match="'Q'"):
+        replay_plan(SOMA.problem(17), ["Q"])
+    with pytest.raises(InputError, match="one `how` a step"):
+        replay_plan(SOMA.problem(17), ["V"], [None, None])
+    with pytest.raises(InputError, match="direction of three numbers"):
+        replay_plan(SOMA.problem(17, collapse="rigid"), ["B"], [[0, 0]])
+
+
+# -- replays ----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("number", [17, 200])
+def test_a_plan_that_geometry_accepts_leaves_the_rest_standing(number):
+    problem = SOMA.problem(number, collapse="rigid")
+    result = ns.solve(problem)
+    report = replay_plan(problem, result.plan, result.how)
+    assert report.ok
+    assert [step.action for step in report.steps] == list(result.plan)
+    assert all(step.displacement < 0.01 and not step.moved for step in report.steps)
+    assert all(step.share == pytest.approx(step.displacement) for step in report.steps), "the smallest part is one cube"
+    assert report.steps[-1].farthest is None
+
+
+def test_a_part_that_is_taken_from_below_brings_down_what_stood_on_it():
+    for size in (0.05, 1.0, 40.0):
+        report = removal({"post": [(0, 0, 0)], "top": [(0, 0, 1)]}, ["post", "top"], size=size)
+        assert report.start.stood_still
+        assert report.failed_at == 0
+        assert report.steps[0].moved == {"top": pytest.approx(size, rel=0.05)}
+        assert report.steps[0].share == pytest.approx(1.0, rel=0.05)
+        assert "top by" in report.steps[0].reason
+        assert report.steps[1].stood_still, "nothing is left"
+
+
+def test_a_beam_tips_when_its_counterweight_goes():
+    cells = {"post": [(0, 0, 0)], "beam": [(x, 0, 1) for x in range(3)], "weight": [(0, 0, z) for z in range(2, 7)]}
+    report = removal(cells, ["weight"], stop_at_failure=True)
+    assert report.start.stood_still
+    assert set(report.steps[0].moved) == {"beam"}
+
+
+def test_what_is_in_the_way_is_named_though_nothing_falls():
+    report = removal(BOX_WITH_LID, ["core", "lid"], [(1.0, 0.0, 0.0), (0.0, 0.0, 1.0)])
+    assert report.failed_at == 0
+    assert report.steps[0].in_the_way == ("box",)
+    assert "box is in the way of core" in report.steps[0].reason
+    assert report.steps[1].stood_still
+
+
+def test_a_path_leads_round_what_a_straight_line_would_hit():
+    roof = [(3, 0, 1), (3, 0, 2), *((x, 0, 3) for x in range(4))]
+    assembly = ns.Assembly.from_cells({"floor": [(x, 0, 0) for x in range(4)], "hook": [(0, 0, 1)], "roof": roof})
+    assembly = assembly.with_fixed(["roof"])
+    round_it = np.tile(np.eye(4), (3, 1, 1))
+    round_it[1, :3, 3], round_it[2, :3, 3] = (1.0, 0, 0), (1.0, -3.0, 0)
+    how = Way(("hook",), (0.0, 0.0, 1.0))
+    assert removal(assembly, ["hook"], [how]).steps[0].in_the_way == ("roof",)
+    assert removal(assembly, ["hook"], [round_it]).steps[0].stood_still
+
+
+def test_pulled_sideways_a_part_drags_what_lies_on_it_lifted_it_does_not():
+    cells = {"plank": [(x, 0, 0) for x in range(3)], "load": [(1, 0, 1)]}
+    by_hand = removal(cells, ["plank"], [(1.0, 0.0, 0.0)])
+    pulled = removal(cells, ["plank"], [(1.0, 0.0, 0.0)], pulled=True)
+    assert by_hand.steps[0].moved["load"] == pytest.approx(1.0, rel=0.05), "it falls straight down"
+    assert pulled.steps[0].moved["load"] > 1.3, "it comes along, and falls"
+    assert removal(cells, ["load", "plank"], pulled=True).ok
+
+
+def test_a_part_that_cannot_move_is_jammed_when_pulled():
+    assembly = ns.Assembly.from_cells(BOX_WITH_LID).with_fixed(["box"])
+    report = removal(assembly, ["core"], [(1.0, 0.0, 0.0)], pulled=True)
+    assert report.steps[0].in_the_way == ("core",)
+    assert "jammed" in report.steps[0].reason
+
+
+def test_fixed_parts_stay_and_held_parts_are_held():
+    cells = {"foot": [(0, 0, 0)], "arm": [(0, 0, 1), (1, 0, 1), (2, 0, 1)], "load": [(0, 0, z) for z in range(2, 8)]}
+    assembly = ns.Assembly.from_cells(cells)
+    along = Way.along(("load",), (0, 0, 1))
+    assert set(removal(assembly, ["load"], [along]).steps[0].moved) == {"arm"}
+    held = Way(("load",), (0.0, 0.0, 1.0), held=("arm",))
+    assert removal(assembly, ["load"], [held]).ok
+    fixed = removal(assembly.with_fixed(["arm"]), ["load", "foot"])
+    assert fixed.ok
+    assert fixed.steps[1].displacement == pytest.approx(0.0, abs=1e-9), "only the arm is left, in the air"
+
+
+def test_without_gravity_nothing_falls():
+    problem = ns.load_domain("assembly").problem(ns.Assembly.from_cells(BEAM), gravity=False)
+    plan = ["post", "beam", "weight"]
+    assert replay_plan(problem, plan).ok
+    assert not replay_plan(ns.load_domain("assembly").problem(ns.Assembly.from_cells(BEAM)), plan).ok
+
+
+def test_a_tower_is_built_and_one_that_leans_too_far_comes_down():
+    problem = ns.load_domain("tower").problem(100, variant="heights")
+    result = ns.solve(problem)
+    report = replay_plan(problem, result.plan)
+    assert report.ok
+    assert all(step.arrives for step in report.steps)
+    stack = {f"{z}": [(0, 0, z)] for z in range(2)}
+    leaning = ns.Assembly.from_cells({**stack, "out": [(1, 0, 2), (2, 0, 2), (0, 0, 2)]})
+    report = replay_staging(building(leaning, (), ["0", "1", "out"]))
+    assert report.failed_at == 2
+    assert "out" in report.steps[2].moved, "what arrives is to stand, too"
+
+
+def test_cubes_are_judged_by_the_rule_of_the_paper():
+    problem = SOMA.problem(17)
+    result = ns.solve(problem)
+    report = replay_plan(problem, result.plan)
+    assert report.ok
+    assert report.bodies == "cubes"
+    bad = next(o for o in (list("VLTZABP"), list("ATLZBPV")) if not ns.validate(problem, o))
+    failed = replay_plan(problem, bad, stop_at_failure=True)
+    assert failed.failed_at == ns.validate(problem, bad).failed_at
+
+
+def u_shape():
+    """A channel along y, 3 wide, 2 high, its hollow 1 wide and 1 deep, as a mesh: volume 5."""
+    outline = [(0, 0), (3, 0), (3, 2), (2, 2), (2, 1), (1, 1), (1, 2), (0, 2)]
+    front = [(1, 2, 3), (1, 3, 4), (0, 1, 4), (0, 4, 5), (0, 5, 6), (0, 6, 7)]
+    corners = [(x, y, z) for y in (0, 1) for x, z in outline]
+    sides = [t for i in range(8) for j in [(i + 1) % 8] for t in ((i, i + 8, j + 8), (i, j + 8, j))]
+    mesh = trimesh.Trimesh(corners, [*front, *((c + 8, b + 8, a + 8) for a, b, c in front), *sides])
+    mesh.fix_normals()
+    assert mesh.is_watertight
+    return mesh
+
+
+def volume_of(pieces):
+    return sum(ConvexHull(piece).volume for piece in pieces)
+
+
+@given(st.tuples(*[st.floats(-3, 3)] * 3), st.sampled_from(["u", "ring", "box"]), st.floats(0.01, 100))
+@settings(max_examples=25, deadline=None)
+def test_meshes_are_cut_into_convex_pieces_that_make_up_their_volume(turn, shape, scale):
+    ring = trimesh.creation.annulus(0.5, 1, 1, sections=8)
+    mesh, count = {"u": (u_shape(), 3), "ring": (ring, 8), "box": (trimesh.creation.box((1, 2, 3)), 1)}[shape]
+    vertices = scale * mesh.vertices @ Rotation.from_rotvec(turn).as_matrix().T
+    pieces = cut_into_convex(np.asarray(vertices), np.asarray(mesh.faces))
+    assert pieces is not None
+    assert volume_of(pieces) == pytest.approx(mesh.volume * scale**3, rel=1e-4)
+    assert len(pieces) <= 2 * count
+
+
+def test_a_bowl_is_left_to_vhacd():
+    outer, inner = trimesh.creation.icosphere(3, 1.0), trimesh.creation.icosphere(3, 0.8)
+    faces = np.concatenate([outer.faces, inner.faces[:, ::-1] + len(outer.vertices)])
+    shell = np.concatenate([outer.vertices, inner.vertices]), faces
+    assert cut_into_convex(*shell) is None
+    assert convex_pieces("shell", *shell)
+
+
+def test_a_mesh_with_a_hollow_is_taken_apart_so_that_its_hollow_is_one():
+    mesh, X = u_shape(), np.eye(4)
+    X[:3, 3] = 1.5, 0.5, 1.9  # half a unit above the bottom of the hollow
+    channel = Body(Mesh(np.array(mesh.vertices), np.array(mesh.faces)), np.eye(4))
+    assembly = ns.Assembly((Part("u", (channel,), np.eye(4)), Part("in", (Body(Box(np.full(3, 0.8)), np.eye(4)),), X)))
+    with pytest.raises(InputError, match="of its convex hull"):
+        World(assembly)
+    made = {b.part: b for b in rigid_bodies(assembly, "parts", 1.0, meshes="decompose")}
+    assert len(made["u"].solids) > 1
+    assert made["u"].mass == pytest.approx(5.0, rel=1e-6), "mass is that of the mesh, not of its pieces"
+    with World(assembly, meshes="decompose") as world:
+        world.settle()
+        assert world.bounds("in")[0, 2] == pytest.approx(1.0, abs=0.02), "it falls into the hollow"
+    with World(assembly.with_fixed(["u"])) as world:
+        world.settle()
+        assert world.bounds("in")[0, 2] == pytest.approx(1.0, abs=0.02), "exactly as it is, where it is fixed"
+        assert world.displacement()["u", 0] < 1e-6
+
+
+# -- the command ------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def plan_file(tmp_path):
+    path = tmp_path / "plan.json"
+    assert call("plan", "soma", "--problem", "17", "--collapse", "rigid", "--out", path) == 0
+    return path
+
+
+def test_the_command_reports_each_step(plan_file, tmp_path, capfd):
+    before = open_clients()
+    capfd.readouterr()
+    assert call("replay", plan_file, "--json", "--out", tmp_path / "report.json") == 0
+    said = json.loads(capfd.readouterr().out)
+    assert said == json.loads((tmp_path / "report.json").read_text())
+    assert said["ok"]
+    assert said["failed_at"] is None
+    assert len(said["steps"]) == 7
+    keys = {"action", "parts", "displacement", "share", "stood_still", "moved", "in_the_way", "reason"}
+    assert keys <= said["steps"][0].keys()
+    assert call("replay", plan_file) == 0
+    assert "stood still" in capfd.readouterr().out
+    assert open_clients() == before
+
+
+def test_the_command_says_when_something_moved(tmp_path, capfd):
+    cells = tmp_path / "cells.json"
+    cells.write_text(json.dumps({"post": [[0, 0, 0]], "top": [[0, 0, 1]]}))
+    path = tmp_path / "plan.json"
+    assert call("plan", "soma", "--cells", cells, "--collapse", "rigid", "--out", path) == 0
+    cells.unlink()  # the pieces travel with their plan
+    document = json.loads(path.read_text())
+    document["steps"].reverse()
+    path.write_text(json.dumps(document))
+    capfd.readouterr()
+    assert call("replay", path) == 1
+    assert "Step 1, post: " in capfd.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        (lambda d: d.update(schema=99), "schema"),
+        (lambda d: d.update(plan=None), "Expected a plan"),
+        (lambda d: d.update(steps="VLT"), '"steps"'),
+        (lambda d: d.update(number=999), "0 to 239"),
+        (lambda d: d.update(number=None), "which problem"),
+        (lambda d: d.update(domain="somma"), "soma"),
+        (lambda d: d.update(domain=["soma"]), '"domain"'),
+        (lambda d: d.update(options={"collaps": "rigid"}), "options"),
+        (lambda d: d["steps"][0].update(action="Q"), "'Q'"),
+        (lambda d: d["steps"][0].update(how=[0, 0, 0]), "direction"),
+        (lambda d: d["steps"][0].update(how="up"), "direction"),
+        (lambda d: d["steps"][0].update(how=[[1, 0], [0, 1]]), "direction"),
+    ],
+)
+def test_files_that_are_no_plans_are_refused(plan_file, change, expected, capfd):
+    document = json.loads(plan_file.read_text())
+    change(document)
+    plan_file.write_text(json.dumps(document))
+    capfd.readouterr()
+    assert call("replay", plan_file) == 33
+    said = capfd.readouterr()
+    assert expected in said.err
+    assert "Traceback" not in said.err
+    assert said.out == ""
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{", "\0\0", "[" * 10_000])
+def test_files_that_are_no_json_are_refused(tmp_path, text, capfd):
+    path = Path(tmp_path / "plan.json")
+    path.write_text(text)
+    with pytest.raises(InputError):
+        read_plan(path)
+    assert call("replay", path) == 33
+    assert call("replay", tmp_path / "missing.json") == 33
+    assert "Expected" in capfd.readouterr().err
+
+
+def test_a_window_without_a_screen_is_refused_and_ends_nothing(plan_file, monkeypatch, capfd):
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.setattr("sys.platform", "linux")
+    before = open_clients()
+    assert call("replay", plan_file, "--gui") == 33
+    assert "Expected a screen" in capfd.readouterr().err
+    assert open_clients() == before
