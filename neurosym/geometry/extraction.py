@@ -29,18 +29,15 @@ Array = NDArray[np.float64]
 #: What `extract` tries, in this order.
 KINDS: tuple[Kind, ...] = ("lattice", "translation", "rigid")
 
-#: Trees of translations and of rigid motions grow by so much, in smallest extents (and radians): measured on narrow
-#: slots, where longer steps miss the way in and shorter ones never arrive.
-RANGES: dict[Kind, float] = {"translation": 1.0, "rigid": 0.3}
+#: How far trees of translations and of rigid motions grow at once, in smallest extents (plus radians), attempt by
+#: attempt: measured on narrow slots and a hook, where longer steps miss the way in and shorter ones arrive late.
+RANGES: dict[Kind, tuple[float, ...]] = {"translation": (1.0, 0.5, 2.0), "rigid": (1.0, 0.3, 2.0)}
 
 #: How far apart OMPL checks a motion, in smallest extents; each new attempt halves it.
 RESOLUTION = 0.05
 
 #: The share of the budget of a search over rigid motions that goes to quarter turns on the lattice, before the trees.
 TURNS_SHARE = 0.25
-
-#: Attempts of a tree, each from a new seed.
-ATTEMPTS = 4
 
 #: Shortcuts tried on a path that a tree has found.
 SHORTCUTS = 60
@@ -147,10 +144,11 @@ def _turned(removal: Removal, max_checks: int) -> list[Array] | None:
 
 def _grown(removal: Removal, kind: Kind, rng: np.random.Generator) -> list[Array] | None:
     """Poses of a way out that a random tree found, made shorter and confirmed without gaps; None: none was."""
-    turning = kind == "rigid"
-    for attempt in range(ATTEMPTS):
-        share = removal.checks + (removal.max_checks - removal.checks) // (ATTEMPTS - attempt)
-        poses = _tree(removal, turning, RESOLUTION / 2**attempt, share, int(rng.integers(1, 2**31 - 1)))
+    ranges = RANGES[kind]
+    for attempt, length in enumerate(ranges):
+        until = removal.checks + (removal.max_checks - removal.checks) // (len(ranges) - attempt)
+        seed = int(rng.integers(1, 2**31 - 1))
+        poses = _tree(removal, kind == "rigid", length, RESOLUTION / 2**attempt, until, seed)
         if poses is None:
             continue
         if all(removal.is_clear(Motion(a, b, removal.centre)) for a, b in pairwise(poses)):
@@ -160,7 +158,9 @@ def _grown(removal: Removal, kind: Kind, rng: np.random.Generator) -> list[Array
     return None
 
 
-def _tree(removal: Removal, turning: bool, resolution: float, max_checks: int, seed: int) -> list[Array] | None:
+def _tree(
+    removal: Removal, turning: bool, length: float, resolution: float, max_checks: int, seed: int
+) -> list[Array] | None:
     """One attempt with OMPL: RRTConnect towards places outside, or RRT over rigid motions until it is out.
 
     States are where the moving parts' centre is, from its assembled place, in smallest extents, and its rotation.
@@ -227,7 +227,7 @@ def _tree(removal: Removal, turning: bool, resolution: float, max_checks: int, s
         if not goal.hasStates():
             return None
         planner = geometric.RRTConnect(information)
-    planner.setRange(RANGES["rigid" if turning else "translation"])
+    planner.setRange(length)
     setup.setGoal(goal)
     setup.setPlanner(planner)
     setup.solve(base.PlannerTerminationCondition(lambda: bool(removal.checks >= max_checks or removal.spent())))
