@@ -2,7 +2,8 @@
 
 Real structures from ../shared/data (fixed supports, friction 0.5) and synthetic ones from cells. The plan takes the
 highest part that is free and without which the rest stands; where gravity lets no further part go, it says how far it
-came. CPU seconds of one thread, imports left out; each structure runs in a process of its own. Arguments name structures (wall-410, dome, ...); default all.
+came. CPU seconds of one thread, imports left out; each structure runs in a process of its own. Arguments name
+structures (wall-22, dome, ...); default all.
 """
 
 from __future__ import annotations
