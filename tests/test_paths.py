@@ -394,17 +394,17 @@ def test_with_ground_below_nothing_leaves_through_it():
 
 
 def test_a_part_that_comes_down_to_the_ground_leaves_under_the_walls():
-    part = boxes("part", ((0, 0, 1), (1, 1, 2)))
+    part = boxes("part", ((0, 0, 2), (1, 1, 3)))
     walls = boxes(
         "walls",
-        ((-1, -1, 1), (0, 2, 3)), ((1, -1, 1), (2, 2, 3)), ((0, -1, 1), (1, 0, 3)), ((0, 1, 1), (1, 2, 3)),
-        ((0, 0, 2), (1, 1, 3)),
+        ((-1, -1, 2), (0, 2, 4)), ((1, -1, 2), (2, 2, 4)), ((0, -1, 2), (1, 0, 4)), ((0, 1, 2), (1, 2, 4)),
+        ((0, 0, 3), (1, 1, 4)),
     )  # fmt: skip
     assembly = ns.Assembly((part, walls))
-    path = extract(assembly, 0b01, 0b11, rng=rng(), kinds=("lattice",), ground=0.0)
+    path = extract(assembly, 0b01, 0b11, rng=rng(), kinds=("lattice",), ground=1.0)
     assert isinstance(path, Path)
     assert path.poses[1][2, 3] == pytest.approx(-1.0)
-    high = extract(assembly, 0b01, 0b11, rng=rng(), kinds=("lattice",), ground=0.5)
+    high = extract(assembly, 0b01, 0b11, rng=rng(), kinds=("lattice",), ground=1.5)
     assert isinstance(high, Failure)
     assert high.proved
 
