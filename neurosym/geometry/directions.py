@@ -7,6 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from neurosym.errors import InputError
 
@@ -137,18 +140,15 @@ def _distinct(vectors: Array) -> Array:
 
 def _counted(vectors: Array) -> tuple[Array, NDArray[np.int64]]:
     """Distinct unit vectors, in order of first appearance, and how often each comes."""
-    kept: list[Array] = []
-    counts: list[int] = []
-    for vector in vectors:
-        if kept:
-            near = np.linalg.norm(np.array(kept) - vector, axis=1)
-            nearest = int(near.argmin())
-            if near[nearest] <= SAME:
-                counts[nearest] += 1
-                continue
-        kept.append(vector)
-        counts.append(1)
-    return np.array(kept).reshape(-1, 3), np.array(counts, dtype=np.int64)
+    count = len(vectors)
+    if not count:
+        return vectors.reshape(0, 3), np.zeros(0, dtype=np.int64)
+    near = cKDTree(vectors).query_pairs(SAME, output_type="ndarray")
+    links = coo_array((np.ones(len(near), dtype=bool), near.T.astype(np.int32)), shape=(count, count))
+    labels = connected_components(links, directed=False)[1]
+    _, first, counts = np.unique(labels, return_index=True, return_counts=True)
+    order = np.argsort(first)
+    return vectors[first[order]], counts[order]
 
 
 def in_words(vector: Sequence[float]) -> str:
