@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import lru_cache
 
 import numpy as np
@@ -60,15 +61,36 @@ def captioned(
     return np.asarray(canvas)
 
 
-def label(picture: Picture, words: dict[str, tuple[float, float]]) -> Picture:
-    """The picture with names written at points (x, y), in pixels, on white."""
+def label(picture: Picture, seen: Mapping[str, tuple[float, float, float]]) -> Picture:
+    """The picture with names written on circles (x, y, radius), in pixels.
+
+    A name too long for its circle stands beside it, away from the middle of all, at the end of a thin line; where it
+    would cover another name, it is left out.
+    """
     from PIL import Image, ImageDraw
 
     canvas = Image.fromarray(picture)
     draw = ImageDraw.Draw(canvas)
-    font = _font(max(10, round(min(picture.shape[:2]) / 32)))
-    for name, (x, y) in words.items():
-        draw.text((x, y), name, font=font, fill=_TEXT, anchor="mm", stroke_width=3, stroke_fill=_PAPER)
+    size = max(10, round(min(picture.shape[:2]) / 32))
+    font = _font(size)
+    middle = np.mean([(x, y) for x, y, _ in seen.values()], axis=0) if seen else np.zeros(2)
+    taken: list[tuple[float, float, float, float]] = []
+    # The largest first: what is left out should be small.
+    for name, (x, y, radius) in sorted(seen.items(), key=lambda item: -item[1][2]):
+        wide = draw.textlength(name, font=font) / 2
+        at = np.array([x, y])
+        if np.hypot(wide, size / 2) > 1.5 * radius:
+            away = at - middle
+            away = away / max(float(np.hypot(*away)), 1e-9) if away.any() else np.array([0.0, -1.0])
+            at = at + away * (radius + size + wide * abs(away[0]))
+        box = (at[0] - wide, at[1] - 0.6 * size, at[0] + wide, at[1] + 0.6 * size)
+        outside = box[0] < 0 or box[1] < 0 or box[2] > picture.shape[1] or box[3] > picture.shape[0]
+        if outside or any(box[0] < t[2] and t[0] < box[2] and box[1] < t[3] and t[1] < box[3] for t in taken):
+            continue
+        taken.append(box)
+        if (at != (x, y)).any():
+            draw.line([(x, y), tuple(at.tolist())], fill=_TEXT)
+        draw.text(tuple(at.tolist()), name, font=font, fill=_TEXT, anchor="mm", stroke_width=3, stroke_fill=_PAPER)
     return np.asarray(canvas)
 
 

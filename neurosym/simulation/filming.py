@@ -123,10 +123,10 @@ class FilmSet:
 
     def seen_at(
         self, shown: Collection[str], where: Mapping[str, Array] | None = None
-    ) -> dict[str, tuple[float, float]]:
-        """Where in the picture, in pixels (x, y) from the top left, the parts that can be seen are seen.
+    ) -> dict[str, tuple[float, float, float]]:
+        """Where in the picture the parts that can be seen are seen, in pixels (x, y, radius) from the top left.
 
-        The point lies on the part, as far inside what can be seen of it as may be.
+        It is the largest circle in what can be seen of the part.
         """
         from scipy.ndimage import distance_transform_edt
 
@@ -138,7 +138,8 @@ class FilmSet:
             if mine.any():
                 depth = distance_transform_edt(mine)[1:-1, 1:-1]
                 y, x = np.unravel_index(int(np.argmax(depth)), depth.shape)
-                found[name] = (float(x / OVERSAMPLING), float(y / OVERSAMPLING))
+                radius = float(depth[y, x] / OVERSAMPLING)
+                found[name] = (float(x / OVERSAMPLING), float(y / OVERSAMPLING), radius)
         return found
 
     def _shoot(self, shown: Collection[str], moved: Mapping[str, Array]) -> Picture:
