@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cache
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +28,7 @@ from neurosym.geometry.blocking import bits
 from neurosym.geometry.contacts import TABLE, near_pairs
 from neurosym.geometry.sweep import drops_onto
 from neurosym.language import Derived, Fluent, State
+from neurosym.language.formulas import AnyOf, Way
 from neurosym.problem import Verdict
 
 RULES = ("cubes", "strict", "rigid")
@@ -114,7 +116,15 @@ def keeps_standing(present: Fluent, rule: str) -> Derived:
         falling = f"{total} cube{'s' if total > 1 else ''} of {', '.join(because)}"
         return Verdict(False, because, _SAYS[rule].format(names[number], falling), tuple(until), unconditional=True)
 
-    return Derived("keeps_standing", present.types, keeps_standing)
+    def formula(world: Assembly, p: str) -> AnyOf:
+        stacks = Stacks.of(world)
+        over = stacks.over[world.index[p]]
+        count = {world.names[i]: (own & over).bit_count() for i, own in enumerate(stacks.own) if own & over}
+        # At most `limit` cubes may move: of so many pieces over it at the most some may still be there.
+        stay = [s for k in range(limit + 1) for s in combinations(count, k) if sum(count[n] for n in s) <= limit]
+        return AnyOf(tuple(Way("", tuple(~atom_of(n) for n in count if n not in s)) for s in stay))
+
+    return Derived("keeps_standing", present.types, keeps_standing, formula=formula)
 
 
 _STANDS = Verdict(True)
