@@ -22,9 +22,10 @@ import neurosym as ns
 from neurosym.cli import main
 from neurosym.geometry.meshes import signed_volume
 from neurosym.motions import Motion, Staging, stage, steps_in_space
-from neurosym.viewer import panels
+from neurosym.viewer import panels, score_table
 from neurosym.viewer.facts import part_facts
-from neurosym.viewer.session import Planning, Query, Shown, problem_maker
+from neurosym.viewer.planning import Planning, problem_maker
+from neurosym.viewer.session import Query, Search, Shown
 from neurosym.viewer.solids import solids
 from neurosym.viewer.sources import open_source
 from neurosym.viewer.timeline import ABSENT, APART, IN_PLACE, ON_PATH, Timeline
@@ -365,7 +366,7 @@ def test_panels_escape_what_names_hold(shown):
         panels.steps(nasty, 0),
         panels.caption(nasty, 0.0),
         panels.refusals(search),
-        panels.scores_table(scores, [evil], [evil]),
+        score_table.scores_table(scores, [evil], [evil]),
         panels.facts(part_facts(world, "b", world.names)),
         panels.facts(part_facts(world, evil, world.names)),
         panels.message(evil),
@@ -390,8 +391,6 @@ def test_attempts_come_in_order_with_the_plan_between():
 
 
 def make_search(steps, refusals):
-    from neurosym.viewer.session import Search
-
     return Search(steps, (), ns.Status.SOLVED, "", refusals, {}, "")
 
 
@@ -401,24 +400,24 @@ def test_scores_are_cells_with_what_was_taken_ringed(rows, columns):
     names = [f"a{j}" for j in range(columns)]
     scores = ns.OrderScores(rng.normal(size=(rows, columns)), tuple(names))
     taken = [names[-1 - i] for i in range(rows)]
-    text = panels.scores_table(scores, names, taken)
+    text = score_table.scores_table(scores, names, taken)
     assert text.count("stroke=") == rows
-    shown_columns = min(columns, panels.MOST_COLUMNS)
+    shown_columns = min(columns, score_table.MOST_COLUMNS)
     assert text.count("<title>") == rows * shown_columns
-    assert ("left out" in text) == (columns > panels.MOST_COLUMNS)
+    assert ("left out" in text) == (columns > score_table.MOST_COLUMNS)
     for name in taken:
         assert f">{name}<" in text, "what was taken is never left out"
 
 
 def test_large_tables_of_scores_are_pictures():
     names = [f"a{j}" for j in range(184)]
-    text = panels.scores_table(ns.OrderScores.uniform(184, names), names, names)
+    text = score_table.scores_table(ns.OrderScores.uniform(184, names), names, names)
     assert text.startswith("<img src='data:image/png;base64,")
     assert len(text) < 20_000
 
 
 def test_without_a_prior_the_panel_says_so():
-    assert "without a prior" in panels.scores_table(None, ["a"], ["a"])
+    assert "without a prior" in score_table.scores_table(None, ["a"], ["a"])
 
 
 # -- planning in a thread -------------------------------------------------------------------------------------------
@@ -643,10 +642,9 @@ def test_without_viser_the_extra_is_named(monkeypatch, capsys):
 
 
 def test_the_model_loads_no_viser():
-    code = (
-        "import sys, neurosym.cli, neurosym.viewer.timeline, neurosym.viewer.facts, neurosym.viewer.solids, "
-        "neurosym.viewer.panels, neurosym.viewer.session, neurosym.viewer.sources; assert 'viser' not in sys.modules"
-    )
+    pure = ("timeline", "facts", "solids", "panels", "score_table", "planning", "sources")
+    names = ", ".join(f"neurosym.viewer.{name}" for name in pure)
+    code = f"import sys, neurosym.cli, {names}; assert 'viser' not in sys.modules"
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
@@ -695,7 +693,7 @@ def tab(browser, viewer, shown):
     """The page in a browser, with all that it said on its console and all that it asked for."""
     viewer.show(shown)
     tab = browser.new_page(viewport=SMALL)
-    tab.set_default_timeout(60_000)
+    tab.set_default_timeout(120_000)
     tab.add_init_script(SELDOM)
     tab.errors, tab.asked = [], []
     tab.on("console", lambda m: tab.errors.append(m.text) if m.type == "error" else None)
@@ -706,7 +704,7 @@ def tab(browser, viewer, shown):
     return tab
 
 
-def until(true, seconds=60.0):
+def until(true, seconds=120.0):
     end = time.monotonic() + seconds
     while not true():
         assert time.monotonic() < end, "it did not happen in time"
@@ -790,7 +788,7 @@ def test_bad_input_shows_a_message(tab, viewer):
     tab.get_by_role("tab", name="Plan again").click()
     for number, said in (("nonsense", "whole number"), ("999", "0 to 239")):
         field(tab, "Problem").fill(number)
-        until(lambda number=number: viewer.number.value == number)
+        until(lambda number=number: viewer.form.number.value == number)
         tab.get_by_role("button", name="Plan again").click()
         tab.get_by_role("alert").get_by_text(said).wait_for()
     assert "Traceback" not in tab.content()
@@ -800,7 +798,7 @@ def test_bad_input_shows_a_message(tab, viewer):
 def test_one_can_plan_again(tab, viewer):
     tab.get_by_role("tab", name="Plan again").click()
     field(tab, "Problem").fill("3")
-    until(lambda: viewer.number.value == "3")
+    until(lambda: viewer.form.number.value == "3")
     tab.get_by_role("button", name="Plan again").click()
     until(lambda: viewer.shown.problem.name == "soma-3")
     tab.get_by_text("soma-3").first.wait_for()
@@ -810,7 +808,7 @@ def test_one_can_plan_again(tab, viewer):
 
 def test_stop_ends_a_search(tab, viewer):
     tab.get_by_role("tab", name="Plan again").click()
-    viewer.domain.value, viewer.options.value, viewer.planner.value = "slow", "", "exhaustive"
+    viewer.form.domain.value, viewer.form.options.value, viewer.form.planner.value = "slow", "", "exhaustive"
     tab.get_by_role("button", name="Plan again").click()
     until(lambda: viewer.planning is not None and viewer.planning.progress.attempts > 2)
     planning = viewer.planning
@@ -869,7 +867,7 @@ def test_the_exported_page_plays_without_server_and_network(browser, plan_file, 
     context = browser.new_context(viewport=SMALL, offline=True)
     asked, errors = [], []
     tab = context.new_page()
-    tab.set_default_timeout(60_000)
+    tab.set_default_timeout(120_000)
     tab.add_init_script(SELDOM)
     tab.on("request", lambda r: asked.append(r.url))
     tab.on("console", lambda m: errors.append(m.text) if m.type == "error" else None)

@@ -89,7 +89,8 @@ def view(
 
     need_viser()
     from neurosym.viewer.export import check_name, export_page
-    from neurosym.viewer.session import Planning, Query, Shown, check_query
+    from neurosym.viewer.planning import Planning, check_query
+    from neurosym.viewer.session import Query, Shown
     from neurosym.viewer.sources import open_source
 
     if export is not None:

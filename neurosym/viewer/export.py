@@ -11,6 +11,7 @@ from neurosym.errors import InputError
 from neurosym.files import write_text
 from neurosym.viewer import panels
 from neurosym.viewer.scene import PlanScene
+from neurosym.viewer.score_table import scores_table
 from neurosym.viewer.server import LocalServer
 from neurosym.viewer.session import Shown
 
@@ -69,7 +70,7 @@ def _with_panel(film: str, shown: Shown) -> str:
     search = shown.search
     said = (
         f"{panels.overview(shown)}{panels.steps(shown, None)}"
-        f"<h3>Prior</h3>{panels.scores_table(search.scores, shown.problem.actions, search.steps)}"
+        f"<h3>Prior</h3>{scores_table(search.scores, shown.problem.actions, search.steps)}"
         f"<h3>Reference</h3>{panels.pictures(shown.pictures)}"
         f"<h3>Attempts, in order</h3>{panels.refusals(search)}"
     )

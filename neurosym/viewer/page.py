@@ -2,29 +2,28 @@
 
 from __future__ import annotations
 
-import json
 import threading
 import time
 from collections.abc import Mapping
-from typing import Any
 
 import viser
 
 from neurosym.errors import InputError
 from neurosym.language.domain import Problem
-from neurosym.pipeline import ORACLES
-from neurosym.registry import domain_names, planner_names, prior_names
 from neurosym.viewer import panels
 from neurosym.viewer.facts import part_facts
+from neurosym.viewer.form import Form, assign
+from neurosym.viewer.planning import Planning, check_query, problem_maker
 from neurosym.viewer.scene import PlanScene, named_at_first
+from neurosym.viewer.score_table import scores_table
 from neurosym.viewer.server import LocalServer
-from neurosym.viewer.session import REFUSED, Maker, Planning, Query, Shown, check_query, problem_maker
+from neurosym.viewer.session import REFUSED, Maker, Query, Shown
 
 #: Scene updates a second while the film plays, and seconds that a step takes at speed 1.
 RATE, SECONDS_PER_STEP = 30.0, 1.5
 
 SPEEDS = ("0.5×", "1×", "2×", "4×", "8×")
-NO_PART, NO_PRIOR = "(no part)", "none"
+NO_PART = "(no part)"
 
 #: Width of the panel beside the view (CSS pixels).
 PANEL = 420
@@ -39,9 +38,7 @@ class Page:
         given: problems that bear no number in a family: name -> what makes them, of options.
     """
 
-    def __init__(
-        self, server: LocalServer, query: Query, given: Mapping[str, Maker] | None = None
-    ) -> None:
+    def __init__(self, server: LocalServer, query: Query, given: Mapping[str, Maker] | None = None) -> None:
         self.server = server
         self.query = query
         self.given = dict(given or {})
@@ -67,10 +64,10 @@ class Page:
             timeline = shown.timeline
             self.slider.max = max(timeline.n_steps if timeline else 0, 1)
             self.slider.disabled = self.play.disabled = timeline is None or timeline.n_steps == 0
-            _assign(self.slider, 0.0)
+            assign(self.slider, 0.0)
             self.part.options = (NO_PART, *(timeline.names if timeline else ()))
-            _assign(self.part, NO_PART)
-            _assign(self.names, named_at_first(shown.timeline))
+            assign(self.part, NO_PART)
+            assign(self.names, named_at_first(shown.timeline))
             self._fill(shown)
             self._moved(0.0)
 
@@ -91,7 +88,7 @@ class Page:
             self.query = query
             make = problem_maker(query, self.given) if problem is None else lambda: problem
             self.planning = Planning(make, query)
-            self._say("")
+            self.form.refuse("")
 
     def close(self) -> None:
         """End the page's thread and any search; the server is left to who made it."""
@@ -125,47 +122,25 @@ class Page:
             self.part = gui.add_dropdown("Part", (NO_PART,))
             self.part_tab = gui.add_html("")
         with tabs.add_tab("Plan again"):
-            self._build_form()
+            self.form = Form(gui, self.query, self.given)
         self.slider.on_update(lambda _: self._moved(self.slider.value))
         self.play.on_click(lambda _: self._toggle())
         self.names.on_update(lambda _: self.scene.name_parts(self.names.value))
         self.part.on_update(lambda _: self._picked(self.part.value))
         self.refusal.on_update(lambda _: self._look_at(self.refusal.value))
-
-    def _build_form(self) -> None:
-        gui, query = self.server.gui, self.query
-        prior = query.prior or NO_PRIOR
-        self.domain = gui.add_dropdown("Domain", _offered(*self.given, *domain_names()), initial_value=query.domain)
-        self.number = gui.add_text("Problem", "" if query.number is None else str(query.number), hint="its number")
-        self.options = gui.add_text(
-            "Options", _written(query.options), hint='of the domain: collapse=rigid; removed=["V"]'
-        )
-        self.planner = gui.add_dropdown(
-            "Planner", _offered(*planner_names(), query.planner), initial_value=query.planner
-        )
-        self.prior = gui.add_dropdown("Prior", _offered(NO_PRIOR, *prior_names(), prior), initial_value=prior)
-        self.oracle = gui.add_dropdown("Oracle", ORACLES, initial_value=query.oracle)
-        self.seed = gui.add_text("Seed", str(query.seed))
-        self.seconds = gui.add_text(
-            "Seconds", "" if query.seconds is None else f"{query.seconds:g}", hint="budget; empty sets no limit"
-        )
-        self.again = gui.add_button("Plan again", icon=viser.Icon.REFRESH)
-        self.stop = gui.add_button("Stop", icon=viser.Icon.PLAYER_STOP, color="red", disabled=True)
-        self.bar = gui.add_progress_bar(0.0, animated=True, visible=False)
-        self.message = gui.add_html("")
-        self.again.on_click(lambda _: self._again())
-        self.stop.on_click(lambda _: self._stop())
+        self.form.again.on_click(lambda _: self._again())
+        self.form.stop.on_click(lambda _: self._stop())
 
     def _fill(self, shown: Shown) -> None:
         search = shown.search
         self.prior_tab.content = panels.styled(
-            panels.scores_table(search.scores, shown.problem.actions, search.steps)
+            scores_table(search.scores, shown.problem.actions, search.steps)
             + "<p><b>Reference</b></p>"
             + panels.pictures(shown.pictures)
         )
         self.search_tab.content = panels.styled(panels.refusals(search))
         self.refusal.max, self.refusal.disabled = max(len(search.refusals), 1), not search.refusals
-        _assign(self.refusal, 0)
+        assign(self.refusal, 0)
         self.refusal_said.content = ""
         self._step_shown = self._facts_for = None
 
@@ -193,7 +168,7 @@ class Page:
             if timeline is None:
                 return
             if not self.playing and self.slider.value >= timeline.n_steps:
-                _assign(self.slider, 0.0)
+                assign(self.slider, 0.0)
             self._play(not self.playing)
 
     def _play(self, playing: bool) -> None:
@@ -205,10 +180,10 @@ class Page:
         """A part was chosen."""
         with self._lock:
             if self.part.value != name:
-                _assign(self.part, name)  # which calls this again
+                assign(self.part, name)  # which calls this again
                 return
             if name != NO_PART:
-                _assign(self.refusal, 0)
+                assign(self.refusal, 0)
             self.scene.stand_out(None if name == NO_PART else {name: None})
             self._facts_for = None
             self._tell_facts()
@@ -228,7 +203,7 @@ class Page:
                 if self.part.value == NO_PART:
                     self.scene.stand_out(None)
                 return
-            _assign(self.part, NO_PART)
+            assign(self.part, NO_PART)
             refusal = shown.search.refusals[number - 1]
             self.refusal_said.content = panels.styled(panels.looked_at(number, refusal))
             timeline = shown.timeline
@@ -237,7 +212,7 @@ class Page:
             depth = len(refusal.after)
             if shown.search.steps[:depth] == refusal.after:
                 self._play(False)
-                _assign(self.slider, float(depth))
+                assign(self.slider, float(depth))
             colours: dict[str, tuple[int, int, int] | None] = dict.fromkeys(refusal.because, panels.BECAUSE)
             tried = {m.action: m.parts for m in timeline.staging.motions}.get(refusal.action, (refusal.action,))
             self.scene.stand_out(colours | dict.fromkeys(tried, panels.REFUSED))
@@ -264,34 +239,13 @@ class Page:
 
     def _again(self) -> None:
         try:
-            self.plan(self._asked())
+            self.plan(self.form.asked())
         except REFUSED as error:
-            self._say(str(error))
+            self.form.refuse(str(error))
 
     def _stop(self) -> None:
         if self.planning is not None:
             self.planning.stop()
-
-    def _asked(self) -> Query:
-        """What the form says.
-
-        Raises:
-            InputError: a field that is not what it should be.
-        """
-        given = self.domain.value in self.given
-        return Query(
-            domain=self.domain.value,
-            number=None if given else _whole("Problem", self.number.value),
-            options=_read_options(self.options.value),
-            planner=self.planner.value,
-            prior=None if self.prior.value == NO_PRIOR else self.prior.value,
-            oracle=self.oracle.value,
-            seed=_whole("Seed", self.seed.value),
-            seconds=_seconds(self.seconds.value),
-        )
-
-    def _say(self, text: str) -> None:
-        self.message.content = panels.styled(panels.message(text)) if text else ""
 
     def _watch(self) -> None:
         """What a search that is under way, or has just ended, shows."""
@@ -300,18 +254,15 @@ class Page:
             if planning is None:
                 return
             if planning.running:
-                self.again.disabled, self.stop.disabled, self.bar.visible = True, False, True
-                progress = planning.progress
-                _assign(self.bar, 100.0 * progress.depth / max(progress.steps, 1))
-                self.message.content = panels.styled(panels.progress(progress, stopping=planning.stopped))
+                self.form.busy(planning)
                 return
             self.planning = None
-            self.again.disabled, self.stop.disabled, self.bar.visible = False, True, False
+            self.form.busy(None)
             if planning.shown is None:
-                self._say(planning.message or "")
+                self.form.refuse(planning.message or "")
                 return
             self.show(planning.shown)
-            self.message.content = panels.styled(panels.overview(planning.shown))
+            self.form.say(panels.overview(planning.shown))
 
     def _run(self) -> None:
         last, watched = time.perf_counter(), 0.0
@@ -323,53 +274,9 @@ class Page:
                 if self.playing and timeline is not None:
                     pace = float(self.speed.value.removesuffix("×")) / SECONDS_PER_STEP
                     t = min(self.slider.value + passed * pace, float(timeline.n_steps))
-                    _assign(self.slider, t)
+                    assign(self.slider, t)
                     if t >= timeline.n_steps:
                         self._play(False)
             if now - watched > 0.1:
                 watched = now
                 self._watch()
-
-
-def _assign(handle: Any, value: object) -> None:
-    """Set a control. (viser's setter stands apart from its getter, and type checkers take it for read-only.)"""
-    handle.value = value
-
-
-def _offered(*names: str) -> tuple[str, ...]:
-    """Names to choose from, each once; what a plan's file names is among them even where it is not installed."""
-    return tuple(dict.fromkeys(names))
-
-
-def _whole(label: str, text: str) -> int:
-    try:
-        return int(text)
-    except ValueError:
-        raise InputError(f"Expected {label} to be a whole number; got {text!r}.") from None
-
-
-def _seconds(text: str) -> float | None:
-    if not text.strip():
-        return None
-    try:
-        return float(text)
-    except ValueError:
-        raise InputError(f"Expected Seconds to be a number, or empty for no limit; got {text!r}.") from None
-
-
-def _written(options: Mapping[str, Any]) -> str:
-    return "; ".join(f"{k}={v if isinstance(v, str) else json.dumps(v)}" for k, v in options.items())
-
-
-def _read_options(text: str) -> dict[str, Any]:
-    """``key=value; key=value``: a value that is JSON is read as such, anything else is text."""
-    found: dict[str, Any] = {}
-    for piece in filter(None, (p.strip() for p in text.split(";"))):
-        key, equals, value = (p.strip() for p in piece.partition("="))
-        if not equals or not key.isidentifier():
-            raise InputError(f"Expected Options as key=value; key=value; got {piece!r}.")
-        try:
-            found[key] = json.loads(value)
-        except ValueError:
-            found[key] = value
-    return found

@@ -12,7 +12,7 @@ import viser
 from numpy.typing import NDArray
 
 from neurosym.simulation.scene import PALETTE, palette_colour
-from neurosym.viewer.solids import solids
+from neurosym.viewer.solids import Solid, solids
 from neurosym.viewer.timeline import Timeline, floor_of
 
 Array = NDArray[np.float64]
@@ -89,51 +89,39 @@ class PlanScene:
                 self.show(0.0)
 
     def _add(self, timeline: Timeline) -> None:
-        assembly, scene = timeline.staging.assembly, self.server.scene
+        assembly = timeline.staging.assembly
         low, high = assembly.bounds
         self._sent = np.full((len(assembly), 8), np.nan)
         self.scale = SIZE / float((high - low).max())
         self.origin = np.array([*(low[:2] + high[:2]) / 2, floor_of(assembly)])
         thick = 0.0035 * SIZE * min(1.0, 6.0 / len(assembly) ** 0.5)
         for i, solid in enumerate(solids(assembly)):
-            name = assembly.names[i]
-            own = FIXED if name in assembly.fixed else part_colour(i, len(assembly))
-            r, g, b = (round(255 * c) for c in timeline.staging.colours.get(name, own))
-            self._colours.append((r, g, b))
-            middle = timeline.centres[i]
-            node = scene.add_mesh_simple(
-                f"/work/{i}",
-                (solid.vertices - middle) * self.scale,
-                solid.faces,
-                color=(r, g, b),
-                flat_shading=True,
-            )
-            outline = (solid.outline - middle) * self.scale
-            if len(outline):
-                self._outlines[name] = scene.add_line_segments(f"/work/{i}/edges", outline, _EDGE, thickness=thick)
-            if name in timeline.staging.tops:
-                size = np.ptp(timeline.bounds_at_rest[i], axis=0) * self.scale
-                scene.add_image(
-                    f"/work/{i}/top",
-                    timeline.staging.tops[name],
-                    *(0.98 * size[:2]),
-                    format="png",
-                    wxyz=_UPWARD,
-                    position=(0.0, 0.0, 0.51 * size[2]),
-                )
-            tag = scene.add_label(
-                f"/work/{i}/name",
-                name,
-                font_screen_scale=0.9,
-                anchor="center-center",
-                visible=named_at_first(timeline),
-            )
-            self.parts.append(node)
-            self._names.append(tag)
-            if self._on_pick is not None:
-                node.on_click(self._picker(name))
+            self._add_part(timeline, i, solid, thick)
         self._ground(timeline)
         self._look(timeline)
+
+    def _add_part(self, timeline: Timeline, i: int, solid: Solid, thick: float) -> None:
+        """A part's mesh, and under it in the tree its outline, its picture and its name."""
+        assembly, scene = timeline.staging.assembly, self.server.scene
+        name, middle = assembly.names[i], timeline.centres[i]
+        own = FIXED if name in assembly.fixed else part_colour(i, len(assembly))
+        r, g, b = (round(255 * c) for c in timeline.staging.colours.get(name, own))
+        self._colours.append((r, g, b))
+        vertices, outline = (solid.vertices - middle) * self.scale, (solid.outline - middle) * self.scale
+        node = scene.add_mesh_simple(f"/work/{i}", vertices, solid.faces, color=(r, g, b), flat_shading=True)
+        if len(outline):
+            self._outlines[name] = scene.add_line_segments(f"/work/{i}/edges", outline, _EDGE, thickness=thick)
+        if name in timeline.staging.tops:
+            x, y, z = np.ptp(timeline.bounds_at_rest[i], axis=0) * self.scale
+            top = timeline.staging.tops[name]
+            at = (0.0, 0.0, 0.51 * z)
+            scene.add_image(f"/work/{i}/top", top, 0.98 * x, 0.98 * y, format="png", wxyz=_UPWARD, position=at)
+        named = named_at_first(timeline)
+        tag = scene.add_label(f"/work/{i}/name", name, font_screen_scale=0.9, anchor="center-center", visible=named)
+        self.parts.append(node)
+        self._names.append(tag)
+        if self._on_pick is not None:
+            node.on_click(self._picker(name))
 
     def _picker(self, name: str) -> Callable[[Any], None]:
         def picked(_: Any) -> None:

@@ -1,0 +1,171 @@
+"""Planning in a thread, which can be watched and stopped."""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+from neurosym.errors import InputError, UnknownNameError
+from neurosym.language.domain import Problem
+from neurosym.pipeline import ORACLES, advice, solve
+from neurosym.planner import Budget, SearchLog
+from neurosym.registry import load_domain, planner_names, prior_names
+from neurosym.viewer.session import REFUSED, Maker, Query, Search, Shown
+
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a search is.
+
+    Attributes:
+        phase: what is being done, in words.
+        attempts, refusals, expansions: so far.
+        depth: length of the longest prefix that works, of `steps` at most.
+        steps: number of action primitives; 0 while unknown.
+        seconds: since it began.
+    """
+
+    phase: str
+    attempts: int = 0
+    refusals: int = 0
+    expansions: int = 0
+    depth: int = 0
+    steps: int = 0
+    seconds: float = 0.0
+
+
+class Planning:
+    """One search in a thread of its own, which can be watched and stopped.
+
+    A stop is heeded before the next attempt or expansion, and between the phases; an attempt that is under way (a
+    simulation, a free-form path) is waited for.
+
+    Args:
+        make: gives the problem; it may take long, and raise what the library refuses.
+        query: how to plan it.
+    """
+
+    def __init__(self, make: Callable[[], Problem], query: Query) -> None:
+        self.query = query
+        self.shown: Shown | None = None
+        self.message: str | None = None
+        self._make = make
+        self._stop = threading.Event()
+        self._start = time.perf_counter()
+        self._progress = Progress("building the problem")
+        self._thread = threading.Thread(target=self._run, name="neurosym planning", daemon=True)
+        self._thread.start()
+
+    @property
+    def running(self) -> bool:
+        return self._thread.is_alive()
+
+    @property
+    def stopped(self) -> bool:
+        """Whether a stop was asked for."""
+        return self._stop.is_set()
+
+    @property
+    def progress(self) -> Progress:
+        return self._progress
+
+    def stop(self) -> None:
+        """Ask the search to end; it keeps the longest prefix that works."""
+        self._stop.set()
+
+    def wait(self, seconds: float | None = None) -> bool:
+        """Wait until it has ended, or for so long; whether it has."""
+        self._thread.join(seconds)
+        return not self.running
+
+    def _run(self) -> None:
+        try:
+            self.shown = self._plan()
+            if self.shown is None:
+                self.message = "Stopped before the search began."
+        except REFUSED as error:
+            self.message = str(error)
+        except Exception as error:
+            # A plug-in's fault: the page says so, whoever started it finds the traceback in the log.
+            _log.exception("Planning failed.")
+            self.message = f"Planning failed with an unexpected {type(error).__name__}: {error}"
+
+    def _plan(self) -> Shown | None:
+        query = self.query
+        problem = self._make()
+        if self._between("asking the prior", problem):
+            return None
+        scores = advice(problem, query.prior)
+        if self._between("searching", problem):
+            return None
+        budget = Budget(seconds=query.seconds, attempts=query.attempts, watch=self._watch)
+        settings: dict[str, Any] = {"planner": query.planner, "prior": scores, "oracle": query.oracle}
+        result = solve(problem, budget=budget, rng=query.seed, **settings)
+        self._between("preparing the film", problem)
+        return Shown.of(problem, Search.of(result, query, scores, stopped=self.stopped))
+
+    def _between(self, phase: str, problem: Problem) -> bool:
+        """Enter a phase; whether a stop was asked for before it."""
+        self._progress = Progress(phase, steps=len(problem.actions), seconds=time.perf_counter() - self._start)
+        return self._stop.is_set()
+
+    def _watch(self, log: SearchLog[Any]) -> bool:
+        self._progress = Progress(
+            "searching",
+            log.attempts,
+            log.iterations,
+            log.expansions,
+            len(log.best_prefix),
+            len(log.problem.actions),
+            time.perf_counter() - self._start,
+        )
+        return self._stop.is_set()
+
+
+def problem_maker(query: Query, given: Mapping[str, Maker]) -> Callable[[], Problem]:
+    """A function that makes the problem of a query.
+
+    Args:
+        given: what the command line was given, by the name it bears on the page.
+
+    Raises:
+        InputError: no such domain, or no number where one is needed.
+    """
+    if query.domain in given:
+        make, what = given[query.domain], query.domain
+    else:
+        family, number = load_domain(query.domain), query.number
+        if number is None:
+            raise InputError(f"Expected the number of a problem of {query.domain!r}; got none.")
+        make, what = partial(family.problem, number), f"a problem of {query.domain!r}"
+
+    def problem() -> Problem:
+        try:
+            return make(**query.options)
+        except TypeError as error:
+            raise InputError(f"Expected options that {what} takes; {error}.") from None
+
+    return problem
+
+
+def check_query(query: Query) -> None:
+    """Refuse at once what would be refused in the thread.
+
+    Raises:
+        UnknownNameError: a planner, a prior or an oracle that nobody offers.
+        InputError: a budget that is none.
+    """
+    named = [("planner", query.planner, planner_names()), ("oracle", query.oracle, ORACLES)]
+    if query.prior is not None and not query.prior.endswith(".safetensors"):
+        named.append(("prior", query.prior, prior_names()))
+    for kind, name, known in named:
+        if name not in known:
+            raise UnknownNameError(kind, name, known)
+    Budget(seconds=query.seconds, attempts=query.attempts)
