@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from importlib import import_module
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated
 
@@ -48,8 +46,6 @@ def export(
         raise InputError("Expected --pddl DIR or --graph FILE, or both; got neither.")
     if pddl is not None and pddl.exists() and not pddl.is_dir():
         raise InputError(f"Expected --pddl to be a folder; {pddl} is a file.")
-    if pddl is not None and find_spec("neurosym.language.pddl") is None:
-        raise NotImplementedError("this version of neurosym writes no PDDL; --graph FILE writes what blocks what")
     problem = problem_at(path, units, removal_options(directions, paths, groups, gravity, held, fixed))
     written: list[Path] = []
     if graph is not None:
@@ -58,7 +54,9 @@ def export(
         write_graph(assembly_graph(problem.world, problem.details["directions"]), graph)
         written.append(graph)
     if pddl is not None:
-        written += import_module("neurosym.language.pddl").write_pddl(problem, pddl)
+        from neurosym.language.pddl import write_pddl
+
+        written += write_pddl(problem, pddl)
     if as_json:
         print_json({"written": [str(file) for file in written]})
     else:
