@@ -6,8 +6,12 @@ from neurosym.plotting.confusion import confusion_figure
 from neurosym.plotting.curves import Curves, Spread, curves_figure
 from neurosym.plotting.density import density_figure, kernel_density
 from neurosym.plotting.errors import classes_figure, repeats_figure
+from neurosym.plotting.graphs import blocking_figure, contact_figure
 from neurosym.plotting.iterations import LAST_BAR, iterations_figure
+from neurosym.plotting.learning import learning_figure
 from neurosym.plotting.points import Panel, points_figure
+from neurosym.plotting.scores import scores_figure
+from neurosym.plotting.search import search_figure
 from neurosym.plotting.style import COLOURS, COLUMN, look_of, save, save_both
 
 if TYPE_CHECKING:
@@ -20,15 +24,20 @@ __all__ = [
     "Curves",
     "Panel",
     "Spread",
+    "blocking_figure",
     "classes_figure",
     "confusion_figure",
+    "contact_figure",
     "curves_figure",
     "density_figure",
     "iterations_figure",
     "kernel_density",
+    "learning_figure",
     "look_of",
     "points_figure",
     "repeats_figure",
     "save",
     "save_both",
+    "scores_figure",
+    "search_figure",
 ]

@@ -1,0 +1,114 @@
+"""What priors believe: the probability of each action at each step, and the order that was chosen."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from neurosym.plotting.style import COLOURS, COLUMN, SMALL, TITLE, tidy
+from neurosym.prior import OrderScores
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+#: With more actions than these no probability is written into its cell, and then no names beside it.
+WRITTEN, MOST_NAMES = 8, 40
+
+
+def scores_figure(
+    scores: Mapping[str, OrderScores] | OrderScores, *, plan: Sequence[str] = (), title: str = "order scores"
+) -> Figure:
+    """A matrix a prior: rows are steps, columns actions, shades probabilities, which add up to one in a row.
+
+    Frames are the likeliest order, dots the plan that was found. Shades grow with the square root, so that what is
+    unlikely is seen. Where the number of steps is unsure, its probability stands at the right of the last step.
+
+    Args:
+        scores: of one prior, or name -> scores, all of the same actions.
+        plan: names of actions in order.
+        title: what the pictures show, or the problem's name.
+    """
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import PowerNorm
+    from matplotlib.figure import Figure
+
+    given = {"": scores} if isinstance(scores, OrderScores) else dict(scores)
+    first = next(iter(given.values()))
+    columns = 2 if len(given) > 1 and first.n_actions <= 20 else 1
+    rows = -(-len(given) // columns)
+    side = (COLUMN - 0.9) / columns
+    tall = min(max(side * first.n_steps / max(first.n_actions, 1), 0.4), 4.0)
+    figure = Figure(figsize=(COLUMN, rows * (tall + 0.3) + 0.85), layout="constrained")
+    axes = figure.subplots(rows, columns, squeeze=False).ravel()
+    norm = PowerNorm(0.5, vmin=0, vmax=1)
+    for k, axis in enumerate(axes):
+        if k >= len(given):
+            axis.remove()
+            continue
+        name, own = list(given.items())[k]
+        axis.imshow(np.exp(own.log_prob), cmap="Blues", norm=norm, aspect="auto")
+        _mark(axis, own, plan)
+        _dress(axis, own, first_column=k % columns == 0, last_row=k + columns >= len(given))
+        axis.set_title(name, fontsize=SMALL, pad=3)
+        if own.n_actions <= WRITTEN:
+            _write(axis, own, small=columns > 1)
+    bar = figure.colorbar(ScalarMappable(norm, "Blues"), ax=list(axes[: len(given)]), aspect=30, pad=0.02)
+    bar.ax.tick_params(labelsize=SMALL)
+    bar.set_ticks([0, 0.1, 0.5, 1], labels=["0", ".1", ".5", "1"])
+    bar.set_label("probability", fontsize=SMALL)
+    figure.suptitle(f"{title}: n = {first.n_steps} steps × {first.n_actions} actions", fontsize=TITLE)
+    for axis in axes[: len(given)][-columns:]:
+        axis.set_xlabel("action" if first.actions else "action (number)", fontsize=TITLE)
+    figure.supylabel("step", fontsize=TITLE)
+    _legend(figure, with_plan=bool(plan))
+    return figure
+
+
+def _mark(axis: Axes, own: OrderScores, plan: Sequence[str]) -> None:
+    from matplotlib.patches import Rectangle
+
+    for step, action in enumerate(own.order()):
+        square = Rectangle((action - 0.5, step - 0.5), 1, 1, fill=False, ec=COLOURS[3], lw=1.3, clip_on=False, zorder=3)
+        axis.add_patch(square)
+    for step, name in enumerate(plan):
+        if name in own.actions and step < own.n_steps:
+            place = (own.actions.index(name) + 0.32, step - 0.32)
+            axis.plot(*place, "o", ms=2.6, mfc="white", mec="black", mew=0.7, zorder=4)
+
+
+def _dress(axis: Axes, own: OrderScores, *, first_column: bool, last_row: bool) -> None:
+    n = own.n_actions
+    names = list(own.actions) if own.actions else [str(i) for i in range(n)]
+    if n <= MOST_NAMES:
+        long = max(map(len, names), default=0) > 2
+        size = SMALL if n <= 20 else 5
+        axis.set_xticks(range(n), names if last_row else [""] * n, rotation=90 if long else 0, fontsize=size)
+    every = max(1, -(-own.n_steps // 15))
+    steps = range(0, own.n_steps, every)
+    axis.set_yticks(steps, [str(s + 1) for s in steps] if first_column else [""] * len(steps))
+    tidy(axis, sides=("top", "right", "left", "bottom"))
+    axis.tick_params(length=0, pad=1)
+    if own.log_length is not None:
+        for step, log in enumerate(own.log_length[1:]):
+            said = f"{100 * np.exp(log):.0f}% ends"
+            axis.text(n - 0.4, step, said, fontsize=5.5, va="center", ha="left", color="0.3")
+
+
+def _write(axis: Axes, own: OrderScores, *, small: bool) -> None:
+    for i, row in enumerate(np.exp(own.log_prob)):
+        for j, p in enumerate(row):
+            if p >= 0.005:  # what rounds to 0% is left out
+                colour = "white" if p > 0.3 else "black"
+                axis.text(j, i, f"{100 * p:.0f}", ha="center", va="center", fontsize=5 if small else 6.5, color=colour)
+
+
+def _legend(figure: Figure, *, with_plan: bool) -> None:
+    from matplotlib.lines import Line2D
+
+    handles = [Line2D([], [], ls="", marker="s", mfc="none", mec=COLOURS[3], mew=1.3, ms=6, label="likeliest order")]
+    if with_plan:
+        handles.append(Line2D([], [], ls="", marker="o", ms=3, mfc="white", mec="black", label="the plan"))
+    figure.legend(handles=handles, loc="outside lower center", ncols=2, fontsize=SMALL, frameon=False)

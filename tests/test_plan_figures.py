@@ -1,0 +1,205 @@
+"""Figures of assemblies, searches, scores and training: they say what was found, and fit a column."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import matplotlib.colors
+import numpy as np
+import pytest
+
+import neurosym as ns
+from neurosym.plotting import (
+    COLUMN,
+    blocking_figure,
+    contact_figure,
+    learning_figure,
+    save,
+    scores_figure,
+    search_figure,
+)
+from neurosym.plotting.layers import box_width, in_layers
+from neurosym.plotting.search import MOST_REFUSALS, ON_PLAN, REFUSED
+from neurosym.testing.toys import NumberLine
+
+STOOL = {"seat": [(x, 0, 1) for x in range(3)], "left": [(0, 0, 0)], "right": [(2, 0, 0)]}
+HOOKED = {"hook": [(0, 0, 0), (1, 0, 0), (1, 0, 1)], "eye": [(0, 0, 1), (0, 0, 2), (1, 0, 2), (2, 0, 2), (2, 0, 1)]}
+
+
+def texts(figure):
+    return [t.get_text() for t in figure.findobj(lambda artist: hasattr(artist, "get_text"))]
+
+
+def places(figure):
+    """Where the names are, in inches: the last text of a name is its box."""
+    return {t.get_text(): t.get_position() for t in figure.axes[0].texts if t.get_bbox_patch() is not None}
+
+
+def same_colour(a, b):
+    return matplotlib.colors.same_color(a, b)
+
+
+# -- what blocks, what touches --------------------------------------------------------------------------------
+
+
+def test_what_is_free_is_drawn_above_what_it_blocks():
+    figure = blocking_figure(ns.Assembly.from_cells(STOOL), "+z", title="stool")
+    where = places(figure)
+    assert where["seat"][1] > where["left"][1] == where["right"][1]
+    arrows = [t for t in figure.axes[0].texts if getattr(t, "arrow_patch", None) is not None]
+    assert {(tuple(a.xyann), tuple(a.xy)) for a in arrows} == {
+        (where[leg], where["seat"]) for leg in ("left", "right")
+    }  # a leg moved up hits the seat
+
+
+def test_parts_that_leave_only_together_are_in_a_frame():
+    from matplotlib.patches import FancyBboxPatch
+
+    def frames(directions):
+        axis = blocking_figure(ns.Assembly.from_cells(HOOKED), directions).axes[0]
+        return [p for p in axis.patches if isinstance(p, FancyBboxPatch)]
+
+    (frame,) = frames("+x")  # the hook's upper cell is between the eye's legs
+    assert frame.get_width() > box_width("hook") + box_width("eye")
+    assert frames("+y") == []  # sideways both are free
+
+
+def test_opposite_directions_share_a_panel_and_the_title_says_n():
+    said = " | ".join(texts(blocking_figure(ns.Assembly.from_cells(STOOL), title="stool")))
+    for piece in ("stool", "n = 3 parts, 3 directions with their opposites", "along +z", "into the ground", "along +y"):
+        assert piece in said
+
+
+def test_contacts_have_their_areas_and_the_ground_is_below():
+    assembly = ns.Assembly.from_cells(STOOL, size=2.0)
+    figure = contact_figure(assembly, title="stool")
+    where = places(figure)
+    assert where["seat"][1] > where["left"][1] > where["the ground"][1]
+    said = " | ".join(texts(figure))
+    assert "n = 3 parts, 4 contacts" in said
+    assert "area 4" in said  # 2 x 2
+
+
+@pytest.mark.parametrize("draw", [blocking_figure, contact_figure])
+def test_many_parts_become_a_matrix_that_holds_every_pair(draw):
+    column = ns.Assembly.from_cells({f"block {z}": [(0, 0, z)] for z in range(20)})
+    figure = draw(column)
+    images = [image.get_array() for axis in figure.axes for image in axis.images]
+    if draw is blocking_figure:
+        up, *sideways = images
+        assert np.count_nonzero(up) == 20 * 19 / 2
+        assert np.array_equal(up, np.tril(np.ones((20, 20)), -1))  # the free one first
+        assert not any(np.count_nonzero(image) for image in sideways)
+    else:
+        assert np.count_nonzero(np.nan_to_num(images[0].filled(0))) == 2 * 20  # 19 joints and the ground, both ways
+    assert figure.get_figwidth() == COLUMN
+
+
+def test_layers_that_are_too_wide_are_staggered_and_no_box_lies_on_another():
+    names = [f"a long name {k}" for k in range(12)]
+    layout = in_layers([names[:10], names[10:]], [(names[0], names[11])], 3.2)
+    boxes = [(x - box_width(n) / 2, x + box_width(n) / 2, y) for n, (x, y) in layout.places.items()]
+    assert all(left >= 0 and right <= 3.2 and 0 <= y <= layout.height for left, right, y in boxes)
+    for i, (left, right, y) in enumerate(boxes):
+        for other_left, other_right, other_y in boxes[:i]:
+            assert abs(y - other_y) > 0.15 or right < other_left or other_right < left
+
+
+# -- searches -------------------------------------------------------------------------------------------------
+
+
+def marks(figure, marker, colour=None):
+    return [
+        line
+        for line in figure.axes[0].lines
+        if line.get_marker() == marker and (colour is None or same_colour(line.get_color(), colour))
+    ]
+
+
+def test_every_refusal_is_a_cross_at_its_step_and_the_plan_a_line():
+    result = ns.solve(ns.load_domain("soma").problem(17, collapse="strict"), planner="swap-repair", rng=3)
+    assert result.blame
+    figure = search_figure(result, title="Soma 17")
+    crosses = sorted(int(line.get_xdata()[0]) for line in marks(figure, "x", REFUSED))
+    assert crosses == sorted(len(r.after) + 1 for r in result.blame)
+    assert sorted(int(line.get_xdata()[0]) for line in marks(figure, "o", ON_PLAN)) == list(range(8))
+    said = " | ".join(texts(figure))
+    assert "solved" in said
+    assert f"n = {result.attempts} attempts, {result.iterations} iterations" in said
+
+
+def test_a_search_without_a_plan_has_no_line_of_one():
+    result = ns.load_planner("backtracking").plan(NumberLine([2, 4], 7))
+    figure = search_figure(result)
+    assert marks(figure, "o", ON_PLAN) == []
+    assert result.status.name.lower().replace("_", " ") in " ".join(texts(figure))
+
+
+def test_of_a_long_search_the_first_refusals_are_drawn_and_it_says_so():
+    refusals = tuple(ns.Refusal((), f"take(p{k})", "no") for k in range(MOST_REFUSALS + 50))
+    result = ns.PlanResult(ns.Status.GAVE_UP, None, 350, 1, 350, 0.1, blame=refusals)
+    figure = search_figure(result)
+    assert len(marks(figure, "x")) == MOST_REFUSALS
+    assert f"the first {MOST_REFUSALS} of {MOST_REFUSALS + 50} refusals" in " ".join(texts(figure))
+
+
+def test_names_lose_what_all_of_them_share():
+    blame = (ns.Refusal(("take(a)",), "take(b)", "no"),)
+    result = ns.PlanResult(ns.Status.SOLVED, ("take(a)", "take(c)", "take(b)"), 1, 3, 4, 0.1, blame=blame)
+    said = texts(search_figure(result))
+    assert {"a", "b", "c"} <= set(said)
+    assert not any("take" in piece for piece in said)
+
+
+# -- scores ---------------------------------------------------------------------------------------------------
+
+
+def test_frames_are_the_likeliest_order_and_dots_the_plan():
+    scores = ns.OrderScores.from_order([2, 0, 1], ["a", "b", "c"], confidence=0.9)
+    figure = scores_figure(scores, plan=["a", "c", "b"])
+    axis = figure.axes[0]
+    assert np.allclose(axis.images[0].get_array(), np.exp(scores.log_prob))
+    squares = [(round(p.get_x() + 0.5), round(p.get_y() + 0.5)) for p in axis.patches]
+    assert squares == [(2, 0), (0, 1), (1, 2)]
+    dots = [(round(float(line.get_xdata()[0])), round(float(line.get_ydata()[0]))) for line in axis.lines]
+    assert dots == [(0, 0), (2, 1), (1, 2)]
+    assert "n = 3 steps × 3 actions" in " ".join(texts(figure))
+
+
+def test_scores_of_several_priors_and_of_unsure_lengths(tmp_path):
+    names = [f"tile {k}" for k in range(30)]
+    unsure = ns.OrderScores(np.zeros((4, 30)), tuple(names), np.log([0.01, 0.09, 0.4, 0.4, 0.1]))
+    figure = scores_figure({"uniform": unsure, "sure": ns.OrderScores.from_order([0, 1, 2, 3], names)})
+    assert "40% ends" in texts(figure)
+    assert figure.get_figwidth() == COLUMN
+    assert save(figure, tmp_path / "scores.png").stat().st_size > 1000
+
+
+# -- training -------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Epoch:
+    epoch: int
+    train_loss: float
+    held_out_loss: float | None = None
+    held_out_whole_order_accuracy: float | None = None
+
+
+def test_learning_is_drawn_above_and_what_is_right_below():
+    epochs = [Epoch(k, 2.0 / k, 2.2 / k, k / 10) for k in range(1, 10)]
+    figure = learning_figure("Soma", {"sinkhorn": epochs, "tcn": epochs[:4]}, held_out=24)
+    above, below = figure.axes
+    assert list(below.lines[0].get_ydata()) == [k / 10 for k in range(1, 10)]
+    assert [line.get_linestyle() for line in above.lines] == [":", "-", ":", "-"]
+    said = " | ".join(texts(figure))
+    for piece in ("nats a step", "held-out orders", "n = 24 demonstrations", "sinkhorn", "tcn", "epoch"):
+        assert piece in said
+
+
+def test_nothing_held_out_leaves_the_loss_alone():
+    figure = learning_figure("Soma", {"sinkhorn": [Epoch(1, 1.0), Epoch(2, 0.5)]}, held_out=24)
+    assert len(figure.axes) == 1
+    assert "held out" not in " ".join(texts(figure))
+    with pytest.raises(ns.InputError, match="at least one epoch"):
+        learning_figure("Soma", {"sinkhorn": []})
