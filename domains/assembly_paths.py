@@ -15,7 +15,7 @@ from neurosym.ways import Way
 from neurosym.why_not import listed
 
 #: Poses and ways that each kind of search may ask for one way out (`neurosym.geometry.extraction`): seconds, mostly.
-MAX_CHECKS = 20_000
+MAX_CHECKS = 100_000
 
 #: States that the exact search over moves of groups may visit for one separation.
 MAX_STATES = 200_000
