@@ -14,6 +14,9 @@ from neurosym.simulation.solids import RigidBody, quaternion
 
 Array = NDArray[np.float64]
 
+#: PyBullet joins so many shapes to a compound, and drops all further ones without a word.
+MOST_JOINED = 16
+
 
 def collision_shape(client: Client, body: RigidBody, shapes: dict[tuple[float, ...], int], folder: Path) -> int:
     """The number of a collision shape in the body's centre-of-mass frame.
@@ -44,12 +47,16 @@ def collision_shape(client: Client, body: RigidBody, shapes: dict[tuple[float, .
                 physicsClientId=c,
             )
         )
+    if len(body.solids) > MOST_JOINED:
+        # From a file with an object a piece it makes a compound of hulls, as many as there are.
+        hulls = [solid.corners @ X_CW[:3, :3].T + X_CW[:3, 3] for solid in body.solids]
+        return int(p.createCollisionShape(p.GEOM_MESH, fileName=_obj(hulls, folder), physicsClientId=c))
     kinds, halves, files, positions, turns = [], [], [], [], []
     for solid in body.solids:
         X_CB = X_CW @ solid.X_WB
         kinds.append(p.GEOM_MESH if solid.half is None else p.GEOM_BOX)
         halves.append([1.0] * 3 if solid.half is None else solid.half.tolist())
-        files.append("" if solid.half is not None else _obj(solid.vertices, folder))
+        files.append("" if solid.half is not None else _obj([solid.vertices], folder))
         positions.append(X_CB[:3, 3].tolist())
         turns.append(quaternion(X_CB[:3, :3]).tolist())
     return int(
@@ -64,14 +71,18 @@ def collision_shape(client: Client, body: RigidBody, shapes: dict[tuple[float, .
     )
 
 
-def _obj(vertices: Array, folder: Path) -> str:
-    """Write corners as a file, since PyBullet joins meshes to a compound from files only.
+def _obj(hulls: list[Array], folder: Path) -> str:
+    """Write corners as a file, an object a hull, since PyBullet joins meshes to a compound from files only.
 
-    It takes the hull of the corners, and it remembers files by name: the name is a digest of the content.
+    It takes the hulls of the corners, and it remembers files by name: the name is a digest of the content.
     """
-    lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in vertices.tolist()]
-    lines += [f"f {i} {i + 1} {i + 2}" for i in range(1, len(vertices) - 1)]
-    text = "o hull\n" + "\n".join(lines) + "\n"
+    lines, first = [], 1
+    for number, vertices in enumerate(hulls):
+        lines.append(f"o hull{number or ''}")
+        lines += [f"v {x!r} {y!r} {z!r}" for x, y, z in vertices.tolist()]
+        lines += [f"f {i} {i + 1} {i + 2}" for i in range(first, first + len(vertices) - 2)]
+        first += len(vertices)
+    text = "\n".join(lines) + "\n"
     path = folder / f"{hashlib.sha256(text.encode()).hexdigest()}.obj"
     path.write_text(text)
     return str(path)
