@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -22,6 +22,9 @@ from neurosym.commands.assemblies import (
 from neurosym.commands.common import AsJson, print_json
 from neurosym.errors import InputError
 
+#: Default time to look for all falls under gravity.
+SECONDS = 60.0
+
 
 def export(
     path: AssemblyPath,
@@ -39,26 +42,36 @@ def export(
     gravity: Gravity = None,
     held: Held = None,
     fixed: Fixed = None,
+    seconds: Annotated[
+        float, typer.Option("--seconds", help="With --pddl: time to look for all that can fall.")
+    ] = SECONDS,
     as_json: AsJson = False,
 ) -> None:
-    """Write what the geometry found as PDDL for classical planners, or as a graph."""
+    """Write what the geometry found as PDDL for classical planners, or as a graph.
+
+    With gravity, the PDDL lists what falls without what. Where the time ends before the list is known to be whole, the
+    command and the file say so: then a planner's plan should be replayed.
+    """
     if pddl is None and graph is None:
         raise InputError("Expected --pddl DIR or --graph FILE, or both; got neither.")
     if pddl is not None and pddl.exists() and not pddl.is_dir():
         raise InputError(f"Expected --pddl to be a folder; {pddl} is a file.")
     problem = problem_at(path, units, removal_options(directions, paths, groups, gravity, held, fixed))
     written: list[Path] = []
+    said: dict[str, Any] = {}
     if graph is not None:
         from neurosym.graphs import assembly_graph, write_graph
 
         write_graph(assembly_graph(problem.world, problem.details["directions"]), graph)
         written.append(graph)
     if pddl is not None:
-        from neurosym.language.pddl import write_pddl
+        from neurosym.language.pddl import as_pddl
 
-        written += write_pddl(problem, pddl)
+        task = as_pddl(problem, seconds=seconds)
+        written += task.write(pddl)
+        said = {"sound": task.sound, "notes": list(task.notes), "actions": dict(task.actions)}
     if as_json:
-        print_json({"written": [str(file) for file in written]})
+        print_json({"written": [str(file) for file in written], **said})
     else:
-        for file in written:
-            print(file)
+        for line in (*written, *said.get("notes", ())):
+            print(line)
