@@ -8,9 +8,10 @@ there and those that would resist are not, whatever else is there or not.
 from __future__ import annotations
 
 import functools
+import itertools
 import random
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -18,6 +19,12 @@ from neurosym.geometry.blocking import bits
 
 if TYPE_CHECKING:
     from neurosym.geometry.assembly import Assembly
+
+#: So many random removals in a row that met nothing new end the search for what falls.
+QUIET = 40
+
+#: Of so many lost neighbours, at the most, single parts are asked.
+MOST_GONE = 2
 
 
 @dataclass(frozen=True)
@@ -44,7 +51,7 @@ class Falls:
         falls: none implies another.
         complete: whether every set that removals can lead to, and that does not stand, has one of them. False: the
             time ended first; each of them is true, but there may be more.
-        sets: connected sets of parts looked at.
+        sets: connected sets of parts looked at one after the other.
     """
 
     falls: tuple[Fall, ...]
@@ -58,6 +65,7 @@ def find_falls(
     moves: Mapping[int, Sequence[int]],
     *,
     held: int = 0,
+    refuted: Iterable[Sequence[int]] = (),
     seconds: float | None = None,
 ) -> Falls:
     """The falls that a task of removal can meet, each removal leaving only what stands.
@@ -66,44 +74,102 @@ def find_falls(
     not states: each removal splits one of them, and independent stacks add up where their states would multiply. Parts
     elsewhere are taken as gone when it comes to who is in the way; this reaches too many sets, never too few.
 
+    Where half the time does not do for all sets, the other half goes to what an order is likeliest to meet: falls of
+    single parts, which are few questions, and random removals.
+
     Args:
         initial: bitset of the parts that are there at first.
         moves: number of a part -> for each way out a bitset of parts that must be gone before. Others never leave.
         held: how many parts may be held; with any, sets do not stand by themselves, and whole states are looked at.
+        refuted: orders of parts in which something falls; what it is will be among the falls.
         seconds: when to stop.
     """
-    end = None if seconds is None else time.monotonic() + seconds
-    search = _Search(assembly, initial, held)
-    order = random.Random(0)
-    first = search.split(search.loose)
-    waiting, seen = list(first), set(first)
-    while waiting:
-        if end is not None and time.monotonic() > end:
-            return Falls(search.least(), False, len(seen) - len(waiting))
-        group = waiting.pop()
-        # What falls is never left behind; but what falls at first may be taken apart so that the rest stands.
-        if not search.stands(group) and group not in first:
-            continue
-        parts = bits(group)
-        order.shuffle(parts)
-        for part in parts:
-            rest = group & ~(1 << part)
-            if any(not way & rest for way in moves.get(part, ())):
-                found = [g for g in search.split(rest) if g not in seen]
-                seen.update(found)
-                waiting += found
-    return Falls(search.least(), True, len(seen))
+    start = time.monotonic()
+    search = _Search(assembly, initial, held, moves)
+    if search.exhaust(None if seconds is None else start + seconds / 2):
+        return Falls(search.least(), True, search.sets)
+    for order in refuted:
+        there = initial
+        for part in order:
+            there &= ~(1 << part)
+            search.learn(there)
+    assert seconds is not None
+    end = start + seconds
+    search.look_at_single_parts(end)
+    rng = random.Random(0)
+    quiet = 0
+    while quiet < QUIET and time.monotonic() < end:
+        quiet = 0 if search.walk(rng, end) else quiet + 1
+    return Falls(search.least(), False, search.sets)
 
 
 class _Search:
     """The falls found so far, and the questions that find more."""
 
-    def __init__(self, assembly: Assembly, initial: int, held: int) -> None:
+    def __init__(self, assembly: Assembly, initial: int, held: int, moves: Mapping[int, Sequence[int]]) -> None:
+        self.moves = moves
         self.stability = assembly.stability()
         self.initial, self.held = initial, held
         self.fixed = assembly.fixed_mask & initial
         self.loose = initial & ~self.fixed
         self.falls: list[Fall] = []
+        self.stood: set[int] = set()
+        self.sets = 0
+
+    def exhaust(self, end: float | None) -> bool:
+        """Look at every connected set that removals can lead to; whether there was time for all."""
+        order = random.Random(0)
+        first = self.split(self.loose)
+        waiting, seen = list(first), set(first)
+        while waiting:
+            if end is not None and time.monotonic() > end:
+                return False
+            group = waiting.pop()
+            self.sets += 1
+            # What falls is never left behind; but what falls at first may be taken apart so that the rest stands.
+            if not self.stands(group) and group not in first:
+                continue
+            parts = self.free(group)
+            order.shuffle(parts)
+            for part in parts:
+                found = [g for g in self.split(group & ~(1 << part)) if g not in seen]
+                seen.update(found)
+                waiting += found
+        return True
+
+    def look_at_single_parts(self, end: float) -> None:
+        """Find which neighbours each part cannot lose, all others being immovable, the fewest first."""
+        if self.held:
+            return
+        for part in bits(self.loose):
+            around = self._around(1 << part) & self.initial
+            near = [p for p in bits(around) if p in self.moves]
+            for count in range(min(len(near), MOST_GONE) + 1):
+                for some in itertools.combinations(near, count):
+                    if time.monotonic() > end:
+                        return
+                    gone = sum(1 << p for p in some)
+                    there = around & ~gone
+                    known = any(f.happens(there | 1 << part) for f in self.falls if f.moving == 1 << part)
+                    if not known and not self.stability.standing(there | 1 << part, there).stands:
+                        self.falls.append(Fall(1 << part, gone))
+
+    def walk(self, rng: random.Random, end: float) -> bool:
+        """Take out one part after the other as chance has it; whether a fall was met that was not known."""
+        there, known = self.loose, len(self.falls)
+        while time.monotonic() < end:
+            rest = [there & ~(1 << p) for p in self.free(there)]
+            rest = [r for r in rest if not any(f.happens(r | self.fixed) for f in self.falls)]
+            if not rest:
+                break
+            choice = rng.choice(rest)
+            if not self.learn(choice):
+                there = choice
+        return len(self.falls) > known
+
+    def free(self, there: int) -> list[int]:
+        """Numbers of the parts that nothing among those in a bitset keeps."""
+        return [p for p in bits(there) if any(not way & there for way in self.moves.get(p, ()))]
 
     def split(self, parts: int) -> list[int]:
         """Bitsets of the parts that hang together by contacts."""
@@ -122,11 +188,15 @@ class _Search:
     def stands(self, group: int) -> bool:
         """Whether a group stands, with the fixed parts; if not, a fall of it is known from now on."""
         there = group | self.fixed
+        if group in self.stood:
+            return True
         if any(fall.happens(there) for fall in self.falls):
             return False
         answer = self.stability.standing_when_held(there, self.held)
         if not answer.stands:
             self.falls.append(self._least(answer.moving, there))
+        else:
+            self.stood.add(group)
         return answer.stands
 
     def learn(self, state: int) -> bool:

@@ -9,7 +9,7 @@ sequence of PDDL actions is not one to one an order, for a part that can leave i
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -76,12 +76,16 @@ def write_pddl(problem: Problem, directory: str | Path, *, seconds: float | None
     return as_pddl(problem, seconds=seconds).write(directory)
 
 
-def as_pddl(problem: Problem, *, seconds: float | None = SECONDS) -> PddlTask:
+def as_pddl(
+    problem: Problem, *, seconds: float | None = SECONDS, refuted: Sequence[Sequence[str]] = ()
+) -> PddlTask:
     """A problem in PDDL.
 
     Args:
         seconds: for what has to be searched. When it ends before all falls under gravity were found, the task is not
             sound; when it ends before all states of a domain without formulas were seen, there is no task.
+        refuted: orders that `neurosym.validate` refused for what falls in them, of a task that is not sound. In the new
+            task none of them is a plan: solve, replay and write again, until the replay agrees.
 
     Raises:
         InputError: a problem with rules of its own (groups), or one that is no finite list of facts of bearable length.
@@ -91,7 +95,7 @@ def as_pddl(problem: Problem, *, seconds: float | None = SECONDS) -> PddlTask:
             f"Expected a problem whose actions change fluents, to write it as PDDL; {problem.name!r} has rules of its "
             "own (groups of parts that leave together). Ask for single parts."
         )
-    return _Writer(problem, strips(problem, seconds=seconds)).task()
+    return _Writer(problem, strips(problem, seconds=seconds, refuted=refuted)).task()
 
 
 class _Writer:

@@ -102,21 +102,22 @@ class _Instance:
     marks: set[Mark] = field(default_factory=set)
 
 
-def strips(problem: Problem, *, seconds: float | None = None) -> Strips:
+def strips(problem: Problem, *, seconds: float | None = None, refuted: Sequence[Sequence[str]] = ()) -> Strips:
     """Compile a problem without rules of its own.
 
     Args:
         seconds: for the falls, or for the table of states.
+        refuted: orders of action primitives in which something falls.
 
     Raises:
         InputError: a predicate without a formula in a problem of too many states, or a derived goal.
     """
-    return _Compiler(problem, seconds).strips()
+    return _Compiler(problem, seconds, refuted).strips()
 
 
 class _Compiler:
-    def __init__(self, problem: Problem, seconds: float | None) -> None:
-        self.problem, self.seconds = problem, seconds
+    def __init__(self, problem: Problem, seconds: float | None, refuted: Sequence[Sequence[str]]) -> None:
+        self.problem, self.seconds, self.refuted = problem, seconds, refuted
         self.initial = frozenset(problem.init)
         self.instances = self._instances()
         self.helpers: list[Operator] = []
@@ -270,7 +271,9 @@ class _Compiler:
                 ]
                 moves.setdefault(world.index[own.without], []).extend(masks)
         initial = world.mask(n for n in world.names if present(n) in self.initial)
-        found = find_falls(world, initial, moves, held=first.held, seconds=self.seconds)
+        removed = {name: world.index[s.without] for name, s in asked.items() if s}
+        refuted = [[removed[name] for name in order if name in removed] for order in self.refuted]
+        found = find_falls(world, initial, moves, held=first.held, refuted=refuted, seconds=self.seconds)
         self.sound = found.complete
         self.notes.append(
             f"Gravity: {len(found.falls)} falls, found among {found.sets:,} connected sets of parts, "
