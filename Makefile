@@ -9,13 +9,14 @@ STAMP := $(VENV)/.neurosym-installed
 SRC := neurosym domains planners learned_priors tests examples $(wildcard benchmarks)
 OUT ?= out/compare-soma
 
-.PHONY: help setup demo readme reproduce results test check bench clean constraints
+.PHONY: help setup demo readme reproduce results test check bench docs clean constraints
 
 help:
 	@echo "make demo       compare planners and priors on the 120 test cubes (table, results.csv, iterations.png)"
 	@echo "make reproduce  every experiment of the paper, quick scale (up to 15 minutes each), then make results"
 	@echo "make results    docs/results.md and its figures, from the last runs of make reproduce"
 	@echo "make test       the whole test suite"
+	@echo "make docs       the site in site/, links checked, without the network"
 	@echo "make check      ruff, mypy --strict, import-linter"
 	@echo "make bench      the benchmarks"
 	@echo "make setup      only make the virtual environment (VENV=$(VENV) PYTHON=$(PYTHON))"
@@ -59,6 +60,10 @@ check: $(STAMP)
 	$(BIN)/mypy --strict
 	$(BIN)/lint-imports
 
+# Strict: a link that leads nowhere, or a name without a docstring to show, ends it.
+docs: $(STAMP)
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
+
 bench: $(STAMP)
 	@for file in benchmarks/*.py; do echo "== $$file"; OMP_NUM_THREADS=1 $(BIN)/python $$file || exit 1; done
 
@@ -68,5 +73,5 @@ constraints: $(STAMP)
 	mv constraints.tmp constraints.txt
 
 clean:
-	rm -rf out dist build .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
+	rm -rf out dist build site .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
 	find $(SRC) -name __pycache__ -prune -exec rm -rf {} +
