@@ -142,7 +142,8 @@ def orders(task: PddlTask, folder: Path) -> int:
 
 
 def solved(task: PddlTask, folder: Path) -> tuple[str, ...] | None:
-    plan = pyperplan.search.breadth_first_search(read(task, folder))
+    ground = read(task, folder)
+    plan = pyperplan.search.greedy_best_first_search(ground, pyperplan.HEURISTICS["hff"](ground))
     return None if plan is None else task.order([op.name for op in plan])
 
 
@@ -206,7 +207,7 @@ def test_names_are_identifiers_and_never_the_same() -> None:
 
 
 def test_helpers_take_over_where_disjunctions_multiply(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    problem = PROBLEMS["soma, rigid"]
+    problem = PROBLEMS["sample 2, gravity"]
     monkeypatch.setattr(pddl_strips, "MAX_OPERATORS", 1)
     task = as_pddl(problem)
     assert None in task.actions.values()
@@ -225,6 +226,20 @@ def test_without_time_valid_orders_are_kept_and_the_file_says_what_it_is_not(tmp
     exact = count_orders(problem).orders
     assert exact is not None
     assert found >= exact
+
+
+def test_refuted_orders_are_no_plans_any_more(tmp_path: Path) -> None:
+    problem = PROBLEMS["sample 3, gravity"]
+    refuted: list[tuple[str, ...]] = []
+    while True:
+        task = as_pddl(problem, seconds=0, refuted=refuted)
+        order = solved(task, tmp_path)
+        assert order is not None
+        if ns.validate(problem, order):
+            break
+        assert order not in refuted
+        refuted.append(order)
+    assert refuted
 
 
 def test_falls_are_true_and_none_is_missed() -> None:
