@@ -1,5 +1,6 @@
 """The house itself: names that exist, imports that stay light, declarations that match what is installed."""
 
+import re
 import subprocess
 import sys
 import tomllib
@@ -91,9 +92,10 @@ def test_no_test_or_example_hides_a_package():
 
 
 def test_every_direct_dependency_is_pinned():
-    pinned = {line.partition("==")[0].lower() for line in (ROOT / "constraints.txt").read_text().splitlines()}
+    lines = (ROOT / "constraints.txt").read_text().splitlines()
+    pinned = {line.partition("==")[0].lower().replace("_", "-") for line in lines}
     needed = [*PYPROJECT["project"]["dependencies"], *PYPROJECT["project"]["optional-dependencies"]["dev"]]
-    names = {requirement.split(">=")[0].lower() for requirement in needed}
+    names = {re.split("[<>=]", requirement)[0].lower().replace("_", "-") for requirement in needed}
     assert names <= pinned, f"constraints.txt does not pin {sorted(names - pinned)}; run make constraints"
 
 
