@@ -95,7 +95,7 @@ def test_every_direct_dependency_is_pinned():
     lines = (ROOT / "constraints.txt").read_text().splitlines()
     pinned = {line.partition("==")[0].lower().replace("_", "-") for line in lines}
     needed = [*PYPROJECT["project"]["dependencies"], *PYPROJECT["project"]["optional-dependencies"]["dev"]]
-    names = {re.split("[<>=]", requirement)[0].lower().replace("_", "-") for requirement in needed}
+    names = {re.split(r"[\[<>=]", requirement)[0].lower().replace("_", "-") for requirement in needed}
     assert names <= pinned, f"constraints.txt does not pin {sorted(names - pinned)}; run make constraints"
 
 
