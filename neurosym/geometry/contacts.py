@@ -18,7 +18,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from neurosym.geometry import collision
 from neurosym.geometry.broad_phase import Pairs, overlapping_pairs, spans
-from neurosym.geometry.surfaces import Surfaces
+from neurosym.geometry.surfaces import GRID, Surfaces
 
 if TYPE_CHECKING:
     from neurosym.geometry.assembly import Assembly
@@ -190,7 +190,7 @@ def _facet_contacts(assembly: Assembly, pairs: Pairs, sine: float, gap: float) -
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     axes = np.array([np.stack(plane_axes(n), axis=1) for n in normals])  # (planes, 3, 2)
     shadows = [(surfaces.triangles[t] - origins[number][:, None]) @ axes[number] for t in (i, j)]
-    clipped = shapely.intersection(*map(shapely.polygons, shadows))
+    clipped = shapely.intersection(*map(shapely.polygons, shadows), grid_size=GRID * assembly.touch)
     areas = shapely.area(clipped)
     kept = np.flatnonzero(areas > 0)
     number, clipped, areas = number[kept], clipped[kept], areas[kept]

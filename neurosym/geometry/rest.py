@@ -16,10 +16,14 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+#: Share of the smallest extent that counts as an overlap at rest, however coarse `touch` is: along an oblique joint a
+#: layer thinner than `touch` may yet be deeper and wider than it.
+OVERLAP = 1e-3
+
 
 @dataclass(frozen=True, eq=False)
 class RestOverlaps:
-    """Pairs of bodies whose convex hulls overlap by more than `touch` and no more than `mate`.
+    """Pairs of bodies whose convex hulls overlap by more than `OVERLAP` and no more than `mate`.
 
     Attributes:
         pairs: int64 (k, 2), a < b, in order.
@@ -51,7 +55,7 @@ class RestOverlaps:
 
 def _overlaps(assembly: Assembly) -> RestOverlaps:
     """The facet of either hull that is overlapped least shows the shortest way apart (up to edges against edges)."""
-    bounds, half = assembly.body_bounds, assembly.touch / 2
+    bounds, half = assembly.body_bounds, min(assembly.touch, OVERLAP * assembly.smallest_extent) / 2
     near = overlapping_pairs(bounds[:, 0] + half, bounds[:, 1] - half, assembly.owners)
     hulls = Surfaces.of_hulls(assembly)
     depth = np.full(len(near), np.inf)
@@ -63,5 +67,5 @@ def _overlaps(assembly: Assembly) -> RestOverlaps:
             better = first[-distance[first] < depth[pair[first]]]
             depth[pair[better]] = -distance[better]
             ways[pair[better]] = sign * hulls.normals[facet[better]]
-    kept = (depth > assembly.touch) & (depth <= assembly.mate)
+    kept = (depth > 2 * half) & (depth <= assembly.mate)
     return RestOverlaps(near[kept], depth[kept, None] * ways[kept], len(assembly.bodies))

@@ -15,7 +15,7 @@ import shapely
 from numpy.typing import NDArray
 
 from neurosym.geometry.broad_phase import Pairs, spans
-from neurosym.geometry.surfaces import Surfaces
+from neurosym.geometry.surfaces import GRID, Surfaces
 
 Array = NDArray[np.float64]
 Numbers = NDArray[np.int64]
@@ -124,7 +124,7 @@ def _patches(shadows: Shadows, i: Numbers, j: Numbers, apart: Array, touch: floa
     """Where triangles i and j overlap in the plane: deep and wide enough for a hit, deep enough, the patches."""
     first = shapely.polygons(shadows.flat[i])
     second = shapely.polygons(shadows.flat[j] + apart[:, None, :2])
-    patches = shapely.intersection(first, second)
+    patches = shapely.intersection(first, second, grid_size=GRID * touch)
     areas = shapely.area(patches)
     wide = areas > touch * np.maximum(shapely.length(patches) / 2, touch)
     uv, patch = shapely.get_coordinates(patches, return_index=True)

@@ -26,7 +26,7 @@ from neurosym.geometry.broad_phase import Pairs, overlapping_pairs, spans
 from neurosym.geometry.contacts import plane_axes
 from neurosym.geometry.rest import RestOverlaps
 from neurosym.geometry.shadows import Shadows, shadows_hit
-from neurosym.geometry.surfaces import Surfaces, facet_distances
+from neurosym.geometry.surfaces import GRID, Surfaces, facet_distances
 
 if TYPE_CHECKING:
     from neurosym.geometry.assembly import Assembly
@@ -99,7 +99,8 @@ class _Sweeper:
         flat = self.points[hulls.first_vertex[bodies[run]] + place, :2]
         shadows = shapely.convex_hull(shapely.multipoints(flat, indices=run))
         others = _moved(shadows[number[pairs[:, 1]]], apart[:, :2])
-        both = shapely.intersection(shadows[number[pairs[:, 0]]], others)
+        # On a grid: with floating coordinates GEOS may take neighbours along one edge for one and the same.
+        both = shapely.intersection(shadows[number[pairs[:, 0]]], others, grid_size=GRID * touch)
         open_ = np.flatnonzero(shapely.area(both) > touch * np.maximum(shapely.length(both) / 2, touch))
         middle = shapely.get_coordinates(shapely.centroid(both[open_]))
         seen = Shadows.of(hulls, self.frame)
