@@ -22,7 +22,7 @@ Numbers = NDArray[np.int64]
 #: So many pairs of a facet and a vertex are held at a time.
 _AT_A_TIME = 2_000_000
 
-#: Faces and shadows are clipped on a grid of this share of the touching tolerance: with floating coordinates GEOS may take
+#: Faces and shadows are clipped on a grid of this share of the touching tolerance: with floating numbers GEOS may take
 #: two neighbours that share an edge for one and the same (seen with shapely 2 at coordinates of 1e-3).
 GRID = 1e-3
 
