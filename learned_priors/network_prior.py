@@ -208,6 +208,7 @@ class NetworkPrior(Prior):
             width=variant.width,
             temperature=train.temperature if self.recipe.decoding == "sinkhorn" else 1.0,
             stop=self.recipe.stop if shortest < n_steps else "none",
+            iterations=train.iterations if self.recipe.decoding == "sinkhorn" and n_steps < n_actions else None,
         )
         fitted = fit(
             demonstrations,

@@ -38,6 +38,9 @@ class NetworkConfig:
         width: neurons in the hidden layer of the dense head or of the glimpses' reading, or latent dimensions a step of
             the temporal one.
         temperature: what the order's logits are divided by.
+        iterations: of the Sinkhorn operator when reading; None goes on until rows and columns sum to one. Where most
+            actions are left over, as many as in training are far from that, and the logits were learned for them: words
+            of 98 tiles are 99.3% right after 20, 97.8% at the end.
         stop: what tells how many of the T steps a task takes. "none": all of them; "head": a layer on the features of
             the one encoder; "network": a network of its own, with an encoder of its own (the paper's, Sec. IV-B);
             "class": one more action, to stop, at every step (the paper's extension of its temporal network).
@@ -52,6 +55,7 @@ class NetworkConfig:
     width: int
     temperature: float = 1.0
     stop: Stop = "none"
+    iterations: int | None = None
 
     def to_json(self) -> dict[str, Any]:
         return {**asdict(self), "picture_shape": list(self.picture_shape)}
@@ -68,6 +72,8 @@ class NetworkConfig:
                 raise ValueError(f"unknown head {config.head!r} or decoding {config.decoding!r}")
             if config.stop not in get_args(Stop) or (config.stop == "class" and config.decoding != "rows"):
                 raise ValueError(f"unknown stop {config.stop!r}, or a stop class that is not decoded by rows")
+            if config.iterations is not None and (type(config.iterations) is not int or config.iterations < 1):
+                raise ValueError(f"iterations are to be a positive integer or null: {config.iterations!r}")
             if config.n_steps > config.n_actions or not config.temperature > 0:
                 raise ValueError("more steps than actions, or a temperature that is not positive")
         except (TypeError, KeyError, ValueError) as error:
@@ -151,13 +157,16 @@ class OrderNetwork(nn.Module):
         Rows of exp() sum to one, columns to at most one (Sinkhorn). In float64, where sums are exact enough that a
         picture read alone or in a batch stops at the same iteration.
         """
-        exact = logits.order.to(torch.float64) / self.config.temperature
+        exact, some = logits.order.to(torch.float64) / self.config.temperature, self.config.iterations
         if self.config.decoding == "rows":
             return torch.log_softmax(exact, dim=-1)
         if exact.device.type == "cpu":
             table = exact.detach().numpy()
+            if some is not None:
+                return torch.from_numpy(scaled_sinkhorn(table, tolerance=None, max_iterations=some))
             return torch.from_numpy(scaled_sinkhorn(table, tolerance=TOLERANCE, max_iterations=READ_ITERATIONS))
-        return log_sinkhorn(exact, tolerance=TOLERANCE, max_iterations=READ_ITERATIONS)
+        tolerance = TOLERANCE if some is None else None
+        return log_sinkhorn(exact, tolerance=tolerance, max_iterations=READ_ITERATIONS if some is None else some)
 
     def log_length(self, logits: Logits) -> Tensor | None:
         """Log-probabilities that the task takes 0 .. T steps, (B, T + 1), float64; None where it always takes T."""

@@ -93,7 +93,7 @@ def _row_potentials(x: Tensor, v: Tensor, row_mass: Tensor | None) -> Tensor:
 
 
 def scaled_sinkhorn(
-    logits: NDArray[np.float64], *, tolerance: float = TOLERANCE, max_iterations: int = MAX_ITERATIONS
+    logits: NDArray[np.float64], *, tolerance: float | None = TOLERANCE, max_iterations: int = MAX_ITERATIONS
 ) -> NDArray[np.float64]:
     """`log_sinkhorn` for reading: the same matrix, without gradients, several to a hundred times faster.
 
@@ -104,11 +104,14 @@ def scaled_sinkhorn(
 
     Args:
         logits: float64 (B, T, N) with T <= N; finite.
+        tolerance: None runs exactly `max_iterations`.
     """
     steps, actions = logits.shape[-2:]
     spread = np.ptp(logits, axis=(-2, -1)).max(initial=0.0)
-    small = steps < NEWTON_ROWS
-    if (not spread < SAFE_SPREAD and not small) or steps > actions:
+    small = steps < NEWTON_ROWS and tolerance is not None
+    # With a slack row, whose entries are one, no column can vanish.
+    safe = spread < (SAFE_SPREAD if steps == actions else 2 * SAFE_SPREAD)
+    if (not safe and not small) or steps > actions:
         exact = log_sinkhorn(torch.from_numpy(logits), tolerance=tolerance, max_iterations=max_iterations)
         answer: NDArray[np.float64] = exact.numpy()
         return answer
@@ -120,7 +123,7 @@ def scaled_sinkhorn(
     # Potentials: P = exp(x + rows + columns).
     rows, columns = np.zeros((*x.shape[:2], 1)), np.zeros((len(x), 1, actions))
     going = np.arange(len(x))
-    if spread < SAFE_SPREAD:
+    if safe:
         most = min(max_iterations, SINKHORN_FIRST) if small else max_iterations
         going = _alternated(x, mass, rows, columns, tolerance, most)
     if small and len(going) and max_iterations > SINKHORN_FIRST:
@@ -134,17 +137,18 @@ def _alternated(
     mass: NDArray[np.float64],
     rows: NDArray[np.float64],
     columns: NDArray[np.float64],
-    tolerance: float,
+    tolerance: float | None,
     iterations: int,
 ) -> NDArray[np.int64]:
     """Fill in the potentials after at most so many iterations; returns which matrices miss the tolerance then."""
+    within = -1.0 if tolerance is None else tolerance  # nothing is
     table = np.exp(x)
     turned = np.ascontiguousarray(table.swapaxes(1, 2))
     going, down = np.arange(len(x)), np.ones((len(x), x.shape[2], 1))
     for k in range(iterations + 1):
         across = mass / (table @ down)
         sums = turned @ across
-        off = np.abs(down * sums - 1)[..., 0].max(axis=1) > tolerance
+        off = np.abs(down * sums - 1)[..., 0].max(axis=1) > within
         if k == iterations or not off.all():
             # Matrices that are done are left out of the work; most are, long before the last.
             rows[going], columns[going] = np.log(across), np.log(down).swapaxes(1, 2)

@@ -147,6 +147,8 @@ def test_reading_agrees_with_many_iterations(shape: tuple[int, int, int], spread
     np.testing.assert_allclose(np.exp(scaled_sinkhorn(x, tolerance=1e-6)), np.exp(exact), atol=1e-5)
     some = log_sinkhorn(torch.from_numpy(x), max_iterations=7).numpy()
     np.testing.assert_allclose(scaled_sinkhorn(x, max_iterations=7), some, atol=1e-8)
+    fixed = log_sinkhorn(torch.from_numpy(x), tolerance=None, max_iterations=20).numpy()
+    np.testing.assert_allclose(scaled_sinkhorn(x, tolerance=None, max_iterations=20), fixed, atol=1e-8)
 
 
 @pytest.mark.parametrize("steps", [3, 4])
