@@ -847,12 +847,18 @@ def test_pages_of_other_sites_are_not_heard(viewer, origin, heard):
 
 def test_the_command_serves_until_the_keyboard_ends_it():
     command = [sys.executable, "-m", "neurosym.cli", "view", "soma", "--problem", "17", "--no-browser", "--port", "0"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
-        address = process.stdout.readline().split()[0]
-        with urllib.request.urlopen(address, timeout=30) as page:
-            assert b'<div id="root">' in page.read()
-        process.send_signal(signal.SIGINT)
-        out, err = process.communicate(timeout=60)
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    # Where the tests themselves run in the background, interrupts are ignored, and by what they start, too.
+    heard = {"preexec_fn": lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)}
+    with subprocess.Popen(command, **pipes, **heard) as process:
+        try:
+            address = process.stdout.readline().split()[0]
+            with urllib.request.urlopen(address, timeout=30) as page:
+                assert b'<div id="root">' in page.read()
+            process.send_signal(signal.SIGINT)
+            out, err = process.communicate(timeout=60)
+        finally:
+            process.kill()
     assert address.startswith("http://127.0.0.1:")
     assert (process.returncode, out, err) == (0, "Ended.\n", "")
 

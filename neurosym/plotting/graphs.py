@@ -9,10 +9,6 @@ import networkx as nx
 import numpy as np
 from numpy.typing import NDArray
 
-from neurosym.geometry.assembly import Assembly
-from neurosym.geometry.blocking import BlockingGraph, bits
-from neurosym.geometry.contacts import TABLE
-from neurosym.geometry.directions import Directions
 from neurosym.plotting.layers import BOX, LAYER, Layout, box_width, in_inches, in_layers, write_names
 from neurosym.plotting.style import COLOURS, COLUMN, SMALL, TITLE, tidy
 from neurosym.why_not import GROUND
@@ -20,6 +16,10 @@ from neurosym.why_not import GROUND
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    from neurosym.geometry.assembly import Assembly
+    from neurosym.geometry.blocking import BlockingGraph
+    from neurosym.geometry.directions import Directions
 
 #: More parts than this are drawn as a matrix; more than these have no names in it.
 MOST_NODES, MOST_NAMES = 16, 28
@@ -74,6 +74,8 @@ def contact_figure(assembly: Assembly, *, title: str = "assembly") -> Figure:
     Without a ground the layers count from the fixed parts, or from the first one. Of more than `MOST_NODES` parts a
     matrix is drawn, coloured by area.
     """
+    from neurosym.geometry.contacts import TABLE  # loads FCL
+
     areas: dict[tuple[str, str], float] = {}
     for contact in assembly.contacts():
         b = GROUND if contact.b == TABLE else assembly.names[assembly.owners[contact.b]]
@@ -225,6 +227,8 @@ def _write_widths(axis: Axes, areas: Sequence[float]) -> None:
 
 def _matrices(title: str, graph: BlockingGraph, shown: Sequence[int]) -> Figure:
     from matplotlib.figure import Figure
+
+    from neurosym.geometry.blocking import bits
 
     columns = min(2, len(shown))
     rows = -(-len(shown) // columns)

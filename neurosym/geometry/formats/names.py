@@ -42,7 +42,9 @@ def distinct(names: Sequence[str], what: str = "part") -> tuple[list[str], list[
 
 def _plain(name: str) -> str:
     """Without control characters, line ends and halves of characters; white space at the ends is dropped."""
-    kept = ("_" if unicodedata.category(c) in _UNPRINTABLE else c for c in name[: 4 * MAX_LENGTH])
+    cut = name[: 4 * MAX_LENGTH]
+    # Of all white space only the plain space is printable.
+    kept = ("_" if unicodedata.category(c) in _UNPRINTABLE else c if c.isprintable() else " " for c in cut)
     return "".join(kept).strip()[:MAX_LENGTH].strip()
 
 
