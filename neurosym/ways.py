@@ -19,6 +19,9 @@ from neurosym.geometry.directions import in_words
 if TYPE_CHECKING:
     from neurosym.geometry.paths import Path
 
+#: Stands for the ground where the name of a part is expected.
+GROUND = "the ground"
+
 Vector = tuple[float, float, float]
 
 

@@ -11,10 +11,8 @@ from typing import Any
 
 from neurosym.geometry.blocking import BlockingGraph, bits
 from neurosym.geometry.directions import in_words
+from neurosym.ways import GROUND as GROUND
 from neurosym.ways import Vector
-
-#: Stands for the ground where the name of a part is expected.
-GROUND = "the ground"
 
 #: Names, or sentences of one kind, beyond this many are counted, not listed; the data has them all.
 LISTED = 8

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from neurosym.plotting.layers import BOX, LAYER, Layout, box_width, in_inches, in_layers, write_names
 from neurosym.plotting.style import COLOURS, COLUMN, SMALL, TITLE, tidy
-from neurosym.why_not import GROUND
+from neurosym.ways import GROUND
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
