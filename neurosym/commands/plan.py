@@ -172,8 +172,11 @@ def _path(what: str, number: int | None, cells: Path | None) -> Path | None:
     path = Path(what)
     if path.exists() and number is None and cells is None:
         return path
-    if what not in domain_names() and (path.parent != Path() or path.suffix):
-        raise InputError(f"Expected a problem family or the path of an assembly; there is nothing at {what}.")
+    if what not in domain_names():
+        raise InputError(
+            f"Expected the name of a domain, one of {', '.join(sorted(domain_names()))}, or the path of an assembly; "
+            f"there is nothing at {what}."
+        )
     return None
 
 
