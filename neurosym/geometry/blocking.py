@@ -141,8 +141,18 @@ class BlockingGraph:
         return in_words(self.vectors[direction])
 
 
+#: Up to so many bodies a table of all pairs is filled at once (16 MB).
+_DENSE = 4_000
+
+
 def bitsets(pairs: NDArray[np.int64], count: int) -> list[int]:
     """For pairs (i, j), int64 (k, 2), of numbers below `count`: per i, a bitset of its j."""
+    if count <= _DENSE:
+        table = np.zeros((count, count), dtype=bool)
+        table[pairs[:, 0], pairs[:, 1]] = True
+        rows = np.packbits(table, axis=1, bitorder="little")
+        width, packed = rows.shape[1], rows.tobytes()
+        return [int.from_bytes(packed[width * i : width * (i + 1)], "little") for i in range(count)]
     found = []
     order = np.argsort(pairs[:, 0], kind="stable")
     ends = np.searchsorted(pairs[order, 0], np.arange(count + 1))
