@@ -25,7 +25,7 @@ from neurosym.commands.plan import cells_in, pair_of
 from neurosym.errors import InputError
 
 if TYPE_CHECKING:
-    from neurosym.viewer.session import Shown
+    from neurosym.viewer.shown import Shown
     from neurosym.viewer.sources import Source
 
 #: Where the page listens unless told otherwise: this machine alone sees it.
@@ -90,7 +90,7 @@ def view(
     need_viser()
     from neurosym.viewer.export import check_name, export_page
     from neurosym.viewer.planning import Planning, check_query
-    from neurosym.viewer.session import Query, Shown
+    from neurosym.viewer.shown import Query, Shown
     from neurosym.viewer.sources import open_source
 
     if export is not None:

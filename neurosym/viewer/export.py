@@ -13,7 +13,7 @@ from neurosym.viewer import panels
 from neurosym.viewer.scene import PlanScene
 from neurosym.viewer.score_table import scores_table
 from neurosym.viewer.server import LocalServer
-from neurosym.viewer.session import Shown
+from neurosym.viewer.shown import Shown
 
 #: Scene updates a second of the recording, and seconds that a step takes.
 RATE, SECONDS_PER_STEP = 15, 1.5

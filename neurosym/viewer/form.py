@@ -13,7 +13,7 @@ from neurosym.pipeline import ORACLES
 from neurosym.registry import domain_names, planner_names, prior_names
 from neurosym.viewer import panels
 from neurosym.viewer.planning import Planning
-from neurosym.viewer.session import Maker, Query
+from neurosym.viewer.shown import Maker, Query
 
 NO_PRIOR = "none"
 

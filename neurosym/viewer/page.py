@@ -17,7 +17,7 @@ from neurosym.viewer.planning import Planning, check_query, problem_maker
 from neurosym.viewer.scene import PlanScene, named_at_first
 from neurosym.viewer.score_table import scores_table
 from neurosym.viewer.server import LocalServer
-from neurosym.viewer.session import REFUSED, Maker, Query, Shown
+from neurosym.viewer.shown import REFUSED, Maker, Query, Shown
 
 #: Scene updates a second while the film plays, and seconds that a step takes at speed 1.
 RATE, SECONDS_PER_STEP = 30.0, 1.5

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from neurosym.motions import Motion
     from neurosym.planner import Refusal
     from neurosym.viewer.planning import Progress
-    from neurosym.viewer.session import Search, Shown
+    from neurosym.viewer.shown import Search, Shown
 
 #: Refusals written out; a hard search has thousands.
 MOST_REFUSALS = 300

@@ -15,7 +15,7 @@ from neurosym.language.domain import Problem
 from neurosym.pipeline import ORACLES, advice, solve
 from neurosym.planner import Budget, SearchLog
 from neurosym.registry import load_domain, planner_names, prior_names
-from neurosym.viewer.session import REFUSED, Maker, Query, Search, Shown
+from neurosym.viewer.shown import REFUSED, Maker, Query, Search, Shown
 
 _log = logging.getLogger(__name__)
 

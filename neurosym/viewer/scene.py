@@ -81,7 +81,7 @@ class PlanScene:
     def put(self, timeline: Timeline | None) -> None:
         """Show another timeline from its beginning, or nothing."""
         with self.server.atomic():
-            self.server.scene.remove_by_name("/work")
+            self.server.scene.remove_by_name("/parts")
             self.timeline, self._standing_out, self._way, self._way_of = timeline, None, None, None
             self.parts, self._names, self._outlines, self._colours = [], [], {}, []
             if timeline is not None:
@@ -108,16 +108,16 @@ class PlanScene:
         r, g, b = (round(255 * c) for c in timeline.staging.colours.get(name, own))
         self._colours.append((r, g, b))
         vertices, outline = (solid.vertices - middle) * self.scale, (solid.outline - middle) * self.scale
-        node = scene.add_mesh_simple(f"/work/{i}", vertices, solid.faces, color=(r, g, b), flat_shading=True)
+        node = scene.add_mesh_simple(f"/parts/{i}", vertices, solid.faces, color=(r, g, b), flat_shading=True)
         if len(outline):
-            self._outlines[name] = scene.add_line_segments(f"/work/{i}/edges", outline, _EDGE, thickness=thick)
+            self._outlines[name] = scene.add_line_segments(f"/parts/{i}/edges", outline, _EDGE, thickness=thick)
         if name in timeline.staging.tops:
             x, y, z = np.ptp(timeline.bounds_at_rest[i], axis=0) * self.scale
             top = timeline.staging.tops[name]
             at = (0.0, 0.0, 0.51 * z)
-            scene.add_image(f"/work/{i}/top", top, 0.98 * x, 0.98 * y, format="png", wxyz=_UPWARD, position=at)
+            scene.add_image(f"/parts/{i}/top", top, 0.98 * x, 0.98 * y, format="png", wxyz=_UPWARD, position=at)
         named = named_at_first(timeline)
-        tag = scene.add_label(f"/work/{i}/name", name, font_screen_scale=0.9, anchor="center-center", visible=named)
+        tag = scene.add_label(f"/parts/{i}/name", name, font_screen_scale=0.9, anchor="center-center", visible=named)
         self.parts.append(node)
         self._names.append(tag)
         if self._on_pick is not None:
@@ -134,7 +134,7 @@ class PlanScene:
         low, high = self._to_scene(timeline.bounds())
         middle, size = (low + high) / 2, (high - low)[:2] + 0.4 * SIZE
         self.server.scene.add_grid(
-            "/work/ground",
+            "/parts/ground",
             width=float(size[0]),
             height=float(size[1]),
             cell_size=0.1 * SIZE,
@@ -198,7 +198,7 @@ class PlanScene:
         if step is not None:
             way = self._to_scene(timeline.path_of(step))
             pieces = np.stack([way[:-1], way[1:]], axis=1)
-            self._way = self.server.scene.add_line_segments("/work/way", pieces, _PICKED, thickness=0.008 * SIZE)
+            self._way = self.server.scene.add_line_segments("/parts/way", pieces, _PICKED, thickness=0.008 * SIZE)
 
     def stand_out(self, colours: Mapping[str, RGB | None] | None) -> None:
         """Let parts stand out, each in a colour (0..255) or, with None, its own, the others faint; None ends it."""

@@ -13,7 +13,7 @@ from neurosym.language.domain import Problem
 from neurosym.plan_files import SavedPlan, problem_of, read_document, read_plan
 from neurosym.registry import domain_names, load_domain
 from neurosym.viewer.planning import problem_maker
-from neurosym.viewer.session import Maker, Query
+from neurosym.viewer.shown import Maker, Query
 
 #: The family of assemblies that are files, and the prior that such a one is given where nobody names one.
 ASSEMBLY, UNTRAINED = "assembly", "outermost-first"
