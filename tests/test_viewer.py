@@ -25,7 +25,7 @@ from neurosym.motions import Motion, Staging, stage, steps_in_space
 from neurosym.viewer import panels, score_table
 from neurosym.viewer.facts import part_facts
 from neurosym.viewer.planning import Planning, problem_maker
-from neurosym.viewer.session import Query, Search, Shown
+from neurosym.viewer.shown import Query, Search, Shown
 from neurosym.viewer.solids import solids
 from neurosym.viewer.sources import open_source
 from neurosym.viewer.timeline import ABSENT, APART, IN_PLACE, ON_PATH, Timeline
