@@ -139,7 +139,7 @@ _PAPER: dict[str, Any] = {
 # updates, that reads 96% of letters, the dense head 75%. Where all actions are used, it is no better. 10,000 pictures
 # and 2,200 updates of twice the rate read 99.6% (batches of 64; with 32 or 128, 98.5%).
 # Towers are seen in one square view, where each step is at one place: of hard ones of 2 to 6 blocks, 400 demonstrations
-# teach a head of glimpses 98% of whole sequences, the temporal one 77%. It wants many small updates.
+# teach a head of glimpses 99% of whole sequences, the temporal one 77%. It wants many small updates.
 _FULL: dict[str, Any] = {"soft": True, "sum_classes": True, "calibrate": True, "epochs": 80, "least_steps": 1500}
 
 _BC = Recipe("bc", "dense", 128, "rows", TrainConfig(loss="rows", **_PAPER), "class", "independent")
