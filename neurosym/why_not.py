@@ -13,6 +13,7 @@ from neurosym.geometry.blocking import BlockingGraph, bits
 from neurosym.geometry.directions import in_words
 from neurosym.ways import GROUND as GROUND
 from neurosym.ways import Vector
+from neurosym.words import joined
 
 #: Names, or sentences of one kind, beyond this many are counted, not listed; the data has them all.
 LISTED = 8
@@ -180,7 +181,7 @@ def listed(names: Sequence[str]) -> str:
     """'a, b and c'; many names are cut short."""
     if len(names) > LISTED:
         return f"{', '.join(names[: LISTED - 1])} and {len(names) - LISTED + 1} more"
-    return " and ".join(filter(None, [", ".join(names[:-1]), *names[-1:]]))
+    return joined(names)
 
 
 def _fall(fall: Fall) -> str:

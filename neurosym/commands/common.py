@@ -130,8 +130,3 @@ def write_json(given: Any, path: Path) -> None:
 def _plain(value: Any) -> Any:
     """Arrays and numpy's numbers as JSON knows them; anything else as text."""
     return value.tolist() if hasattr(value, "tolist") else str(value)
-
-
-def joined(names: Sequence[str]) -> str:
-    """'V, L and T'."""
-    return " and ".join(filter(None, [", ".join(names[:-1]), *names[-1:]]))

@@ -30,7 +30,6 @@ from neurosym.commands.common import (
     Pictures,
     PictureStyle,
     family_options,
-    joined,
     print_json,
     problem_options,
     write_json,
@@ -40,6 +39,7 @@ from neurosym.family import ProblemFamily
 from neurosym.geometry.directions import in_words
 from neurosym.plan_files import SCHEMA
 from neurosym.ways import Way
+from neurosym.words import joined
 
 if TYPE_CHECKING:
     from neurosym.language.domain import Problem

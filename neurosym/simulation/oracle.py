@@ -18,6 +18,7 @@ from neurosym.errors import InputError
 from neurosym.geometry.assembly import Assembly
 from neurosym.problem import Rejection, Step
 from neurosym.simulation.world import MOVED_SHARE, SETTLE_STEPS, Physics, Snapshot, World
+from neurosym.words import joined
 
 #: The state of a problem under physics: the symbols, and the actions done so far, in order.
 PhysicsState = tuple[int, tuple[int, ...]]
@@ -206,7 +207,7 @@ class PhysicsOracle:
             moving |= {key for key, far in world.displacement(before).items() if far > MOVED_SHARE * world.unit}
         if len(moving) > COLLAPSE_CUBES:
             parts = tuple(name for name in world.assembly.names if any(name == key[0] for key in moving))
-            return Rejection(f"{len(moving)} cubes moved: of {_and(parts)}.", parts)
+            return Rejection(f"{len(moving)} cubes moved: of {joined(parts)}.", parts)
         return _Accepted()
 
     def _rigid(self, part: str) -> Rejection | _Accepted:
@@ -221,12 +222,12 @@ class PhysicsOracle:
             blockers.update(dict.fromkeys(found))
         else:
             names = tuple(blockers)
-            return Rejection(f"{part} cannot leave along a straight line: {_and(names)} in its way.", names)
+            return Rejection(f"{part} cannot leave along a straight line: {joined(names)} in its way.", names)
         world.remove(part)
         world.settle()
         moved = world.moved(since=before)
         if moved:
-            said = _and(tuple(f"{name} by {distance:.2g}" for name, distance in moved.items()))
+            said = joined(tuple(f"{name} by {distance:.2g}" for name, distance in moved.items()))
             return Rejection(f"Parts moved: {said}.", tuple(moved))
         return _Accepted(tuple(float(x) for x in direction), world.poses())
 
@@ -246,8 +247,3 @@ class PhysicsOracle:
             if hit := world.overlaps(part, direction * (i * step), PROBE_TOLERANCE * world.unit):
                 return hit
         return ()
-
-
-def _and(names: Sequence[str]) -> str:
-    """'L', 'L and T', 'L, T and V'."""
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

@@ -28,6 +28,7 @@ from neurosym.simulation.carrying import Carrier, hold
 from neurosym.simulation.oracle import COLLAPSE_CUBES, CUBES_CLEARANCE
 from neurosym.simulation.scene import part_colours
 from neurosym.simulation.world import MOVED_SHARE, SETTLE_STEPS, Physics, Snapshot, World
+from neurosym.words import joined
 
 if TYPE_CHECKING:
     from neurosym.geometry.assembly import Assembly
@@ -231,7 +232,7 @@ class _Run:
             self._paint()
         elif not there & set(motion.parts):
             # A sub-assembly that left as a whole is taken apart where nothing rests on it.
-            said = f"{_and(motion.parts)} left before, with others: taken from them in the hand."
+            said = f"{joined(motion.parts)} left before, with others: taken from them in the hand."
             return StepReplay(motion.action, motion.parts, False, 0.0, 0.0, None, {}, (), True, said)
         before = world.poses()
         with ExitStack() as stack:
@@ -311,11 +312,11 @@ def _reason(
 ) -> str:
     said = []
     if blocked and set(blocked) == set(motion.parts):
-        said.append(f"{_and(blocked)} jammed on the way.")
+        said.append(f"{joined(blocked)} jammed on the way.")
     elif blocked:
-        said.append(f"{_and(blocked)} {'is' if len(blocked) == 1 else 'are'} in the way of {_and(motion.parts)}.")
+        said.append(f"{joined(blocked)} {'is' if len(blocked) == 1 else 'are'} in the way of {joined(motion.parts)}.")
     if moved:
-        said.append("Moved: " + _and([f"{part} by {far:.3g}" for part, far in moved.items()]) + ".")
+        said.append("Moved: " + joined([f"{part} by {far:.3g}" for part, far in moved.items()]) + ".")
     elif farthest is None:
         said.append("Nothing is left.")
     elif not said:
@@ -330,7 +331,3 @@ def smallest_part(assembly: Assembly) -> float:
         bounds = assembly.body_bounds[assembly.owners == number]
         found.append(float((bounds[:, 1].max(axis=0) - bounds[:, 0].min(axis=0)).min()))
     return min(found)
-
-
-def _and(names: Sequence[str]) -> str:
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
