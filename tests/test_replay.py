@@ -126,7 +126,8 @@ def test_a_plan_that_geometry_accepts_leaves_the_rest_standing(number):
     report = replay_plan(problem, result.plan, result.how)
     assert report.ok
     assert [step.action for step in report.steps] == list(result.plan)
-    assert all(step.displacement < 0.01 and not step.moved for step in report.steps)
+    # Well under what counts as moved (0.2 of a cube): processors differ in how far Bullet lets a part settle.
+    assert all(step.displacement < 0.1 and not step.moved for step in report.steps)
     assert all(step.share == pytest.approx(step.displacement) for step in report.steps), "the smallest part is one cube"
     assert report.steps[-1].farthest is None
 
