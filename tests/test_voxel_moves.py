@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 import neurosym as ns
 from neurosym.errors import InputError
-from neurosym.geometry import voxel_moves
+from neurosym.geometry import voxel_search
 from neurosym.geometry.grid import GridCells, cells_of
 from neurosym.geometry.voxel_moves import (
     DIRECTIONS,
@@ -341,7 +341,7 @@ def test_many_parts_are_answered_as_few_are(cells, fixed):
     full, held = (1 << len(cells)) - 1, int(fixed)
     few = first_separation(grid(cells), full, fixed=held)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(voxel_moves, "FEW", 1)
+        patch.setattr(voxel_search, "FEW", 1)
         many = first_separation(grid(cells), full, fixed=held)
     assert type(many) is type(few)
     if isinstance(few, Separation) and isinstance(many, Separation):
