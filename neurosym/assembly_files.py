@@ -1,9 +1,10 @@
-"""Which assembly a plan's file speaks of: where it was read, and a digest that tells whether it is still the same."""
+"""Which assembly a plan's file speaks of: where and how it was read, and a digest that tells whether it has changed."""
 
 from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -11,11 +12,53 @@ import numpy as np
 
 from neurosym.errors import InputError
 from neurosym.geometry.assembly import Assembly
+from neurosym.geometry.tolerances import Tolerances
 
 
-def reference(path: Path, units: str | None, assembly: Assembly) -> dict[str, Any]:
+@dataclass(frozen=True, kw_only=True)
+class Reading:
+    """How an assembly is read, where its files leave it open; None: as `Assembly.load` does by itself.
+
+    Attributes:
+        units: of the lengths.
+        up: "y" or "z", what is up in the files.
+        touch: share of the smallest extent up to which faces, near or overlapping, count as touching.
+        friction: Coulomb's coefficient.
+        puzzle, solution: which of a puzzle file's, counted from 1.
+    """
+
+    units: str | None = None
+    up: str | None = None
+    touch: float | None = None
+    friction: float | None = None
+    puzzle: int | None = None
+    solution: int | None = None
+
+    def load(self, path: str | Path) -> Assembly:
+        """The assembly at a path; raises what `Assembly.load` does."""
+        return Assembly.load(
+            path,
+            units=self.units,
+            up=self.up,
+            tolerances=None if self.touch is None else Tolerances(touch=self.touch),
+            friction=self.friction,
+            problem=1 if self.puzzle is None else self.puzzle,
+            solution=1 if self.solution is None else self.solution,
+        )
+
+    def as_json(self) -> dict[str, Any]:
+        """What was asked for, and nothing else."""
+        return {name: value for name, value in asdict(self).items() if value is not None}
+
+    @classmethod
+    def from_json(cls, said: Mapping[str, Any]) -> Reading:
+        """The inverse of `as_json`; other entries are not looked at."""
+        return cls(**{field.name: said.get(field.name) for field in fields(cls)})
+
+
+def reference(path: Path, reading: Reading, assembly: Assembly) -> dict[str, Any]:
     """What is written of an assembly that was loaded from `path`."""
-    return {"path": str(path.resolve()), "units": units, "digest": digest(assembly)}
+    return {"path": str(path.resolve()), **reading.as_json(), "digest": digest(assembly)}
 
 
 def referenced(said: Any, beside: Path) -> Assembly:
@@ -31,7 +74,7 @@ def referenced(said: Any, beside: Path) -> Assembly:
     found = next((place for place in places if place.exists()), None)
     if found is None:
         raise InputError(f"Expected the assembly of {beside} at {places[0]} or at {places[1]}; it is in neither place.")
-    assembly = Assembly.load(found, units=said.get("units"))
+    assembly = Reading.from_json(said).load(found)
     if said.get("digest") not in (None, digest(assembly)):
         raise InputError(f"Expected the assembly that {beside} was planned for; {found} has changed since. Plan again.")
     return assembly

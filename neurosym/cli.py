@@ -6,7 +6,7 @@ Exit codes are in `neurosym.exit_codes`. Nothing heavy is imported before a comm
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Annotated
 
 import typer
@@ -22,6 +22,7 @@ from neurosym.commands.render import render
 from neurosym.commands.replay import replay
 from neurosym.commands.reproduce import reproduce
 from neurosym.commands.results import results
+from neurosym.commands.spread import spread
 from neurosym.commands.survey import doctor, names
 from neurosym.commands.view import view
 from neurosym.errors import NeurosymError
@@ -37,20 +38,25 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
-app.command("compare")(compare)
-app.command("plan")(plan)
-app.command("view")(view)
-app.command("inspect")(inspect)
-app.command("count")(count)
-app.command("export")(export)
-app.command("demos")(demos)
-app.command("train")(train)
-app.command("render")(render)
-app.command("replay")(replay)
-app.command("reproduce")(reproduce)
-app.command("results")(results)
-app.command("list")(names)
-app.command("doctor")(doctor)
+#: What the command line offers, in the order in which `--help` lists it.
+_COMMANDS: dict[str, Callable[..., None]] = {
+    "compare": compare,
+    "plan": plan,
+    "view": view,
+    "inspect": inspect,
+    "count": count,
+    "export": export,
+    "demos": demos,
+    "train": train,
+    "render": render,
+    "replay": replay,
+    "reproduce": reproduce,
+    "results": results,
+    "list": names,
+    "doctor": doctor,
+}
+for _name, _command in _COMMANDS.items():
+    app.command(_name)(spread(_command))
 
 #: What typer and click exit with when an option is wrong; ours is `BAD_INPUT`.
 _USAGE = 2

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import inspect
 import json
+from dataclasses import dataclass
 from pathlib import Path
 
 import networkx as nx
@@ -12,7 +14,8 @@ import trimesh
 
 import neurosym as ns
 from neurosym.cli import main
-from neurosym.commands.assemblies import problem_at
+from neurosym.commands.assemblies import FileOptions, problem_at
+from neurosym.commands.spread import spread
 from neurosym.plan_files import read_plan
 from neurosym.ways import Way
 
@@ -247,5 +250,116 @@ def test_the_wall_is_planned_and_not_counted(capsys, shared, tmp_path):
 
 
 def test_the_problem_of_a_path_is_that_of_the_domain(gate):
-    problem = problem_at(gate, "m", {"gravity": False})
+    problem = problem_at(gate, FileOptions(units="m"), {"gravity": False})
     assert (problem.name, problem.world.units, problem.details["gravity"]) == ("gate", "m", False)
+
+
+# -- how files are read -------------------------------------------------------------------------------------------
+
+PUZZLE = """<?xml version="1.0"?><puzzle version="2"><gridType type="0"/><colors/><shapes>
+<voxel x="3" y="1" z="1" type="0">###</voxel><voxel x="3" y="2" z="1" type="0">###___</voxel>
+<voxel x="3" y="2" z="1" type="0">######</voxel></shapes><problems>
+<problem name="one" state="2"><shapes><shape id="0" count="1"/></shapes><result id="0"/>
+<solutions><solution asmNum="0"><assembly>0 0 0 0</assembly></solution></solutions></problem>
+<problem name="two" state="2"><shapes><shape id="0" count="2"/></shapes><result id="2"/><solutions>
+<solution asmNum="0"><assembly>0 0 0 0 0 1 0 0</assembly></solution>
+<solution asmNum="1"><assembly>0 1 0 0 0 0 0 0</assembly></solution></solutions></problem>
+</problems></puzzle>"""
+
+
+def test_what_is_up_in_the_files_can_be_said_and_is_kept_with_the_plan(capsys, tmp_path):
+    folder = tmp_path / "tower"
+    folder.mkdir()
+    for i, name in enumerate(("base", "top")):
+        trimesh.creation.box((1, 1, 1), trimesh.transformations.translation_matrix((0, i, 0))).export(
+            folder / f"{name}.stl"
+        )
+    lying = answer(capsys, "inspect", folder)[1]
+    assert "+z" in lying["free_along"]["base"]
+    code, standing, _ = answer(capsys, "inspect", folder, "--up", "y")
+    assert code == 0
+    assert any(note.startswith("y is up in the file") for note in standing["notes"])
+    assert "+z" not in standing["free_along"]["base"]
+    out = tmp_path / "plan.json"
+    code, found, _ = answer(capsys, "plan", folder, "--up", "y", "--directions", "+z", "--out", out)
+    assert (code, found["plan"]) == (0, ["top", "base"])
+    saved = read_plan(out)
+    assert np.allclose(saved.problem.world.bounds, [[-0.5, -0.5, -0.5], [0.5, 0.5, 1.5]])
+    assert ns.validate(saved.problem, saved.plan, saved.how).ok
+
+
+def test_faces_that_overlap_deeply_mate_where_that_is_said(capsys, tmp_path):
+    folder = tmp_path / "pair"
+    folder.mkdir()
+    for name, z in (("low", 0.0), ("high", 0.9)):
+        trimesh.creation.box((1, 1, 1), trimesh.transformations.translation_matrix((0, 0, z))).export(
+            folder / f"{name}.obj"
+        )
+    code, _, err = call(capsys, "inspect", folder)
+    assert (code, "--touch" in err) == (33, True)
+    out = tmp_path / "plan.json"
+    code, found, _ = answer(capsys, "plan", folder, "--touch", "0.11", "--out", out)
+    assert (code, found["plan"]) == (0, ["high", "low"])
+    assert read_plan(out).problem.world.tolerances.touch == 0.11
+
+
+def test_friction_decides_what_stands(capsys, tmp_path):
+    path = tmp_path / "slope.json"
+    turn = trimesh.transformations.rotation_matrix(np.radians(20), [0, 1, 0])
+    slab = trimesh.creation.box((4, 2, 0.5))
+    block = trimesh.creation.box((1, 1, 0.5), trimesh.transformations.translation_matrix((0, 0, 0.5)))
+    meshes = {"slab": slab.apply_transform(turn), "block": block.apply_transform(turn)}
+    ns.Assembly.from_meshes(meshes).with_fixed(["slab"]).save(path)
+    assert answer(capsys, "inspect", path)[1]["stands"] is True
+    assert answer(capsys, "inspect", path, "--friction", "0.2")[1]["stands"] is False
+
+
+def test_which_puzzle_of_a_file_and_which_of_its_solutions(capsys, tmp_path):
+    path = tmp_path / "two.xmpuzzle"
+    path.write_text(PUZZLE)
+    assert len(answer(capsys, "inspect", path)[1]["parts"]) == 1
+    assert len(answer(capsys, "inspect", path, "--puzzle", "2")[1]["parts"]) == 2
+    out = tmp_path / "plan.json"
+    assert answer(capsys, "plan", path, "--puzzle", "2", "--solution", "2", "--out", out)[0] == 0
+    assert json.loads(out.read_text())["assembly"]["solution"] == 2
+    first, second = (ns.Assembly.load(path, problem=2, solution=n) for n in (1, 2))
+    loaded = read_plan(out).problem.world
+    assert np.allclose(loaded.body_bounds, second.body_bounds)
+    assert not np.allclose(loaded.body_bounds, first.body_bounds)
+    code, _, err = call(capsys, "inspect", path, "--puzzle", "3")
+    assert (code, "3" in err) == (33, True)
+
+
+@pytest.mark.parametrize("command", ["plan", "render", "view"])
+def test_a_problem_family_has_no_files_to_read(command, capsys, tmp_path):
+    extra = {"render": ("--exploded", tmp_path / "x.png"), "view": ("--no-browser",)}.get(command, ())
+    code, _, err = call(capsys, command, "soma", "--problem", "17", "--up", "y", *extra)
+    assert code == 33
+    assert "problem family" in err
+
+
+def test_options_that_commands_share_stand_in_the_place_of_their_group():
+    @dataclass(frozen=True)
+    class Shared:
+        one: int = 1
+        two: str = "b"
+
+    def command(what: str, *, shared: Shared, last: bool = False) -> None:
+        got.append((what, shared, last))
+
+    command.__annotations__["shared"] = Shared
+    got: list = []
+    spread_out = spread(command)
+    assert list(inspect.signature(spread_out).parameters) == ["what", "one", "two", "last"]
+    spread_out(what="x", one=5, two="b", last=True)
+    assert got == [("x", Shared(5), True)]
+
+    @dataclass(frozen=True)
+    class Bare:
+        one: int
+
+    def other(*, shared) -> None: ...
+
+    other.__annotations__["shared"] = Bare
+    with pytest.raises(TypeError, match="default for every option"):
+        spread(other)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -11,6 +12,7 @@ import typer
 from neurosym.errors import InputError
 
 if TYPE_CHECKING:
+    from neurosym.assembly_files import Reading
     from neurosym.geometry.assembly import Assembly
     from neurosym.language.domain import Problem
 
@@ -22,64 +24,109 @@ class Paths(StrEnum):
     any = "any"
 
 
+class Up(StrEnum):
+    """What is up in a file."""
+
+    y = "y"
+    z = "z"
+
+
 AssemblyPath = Annotated[
     Path, typer.Argument(metavar="PATH", help="A folder with one mesh a part, a scene, a puzzle, an assembly's JSON.")
 ]
-Units = Annotated[
-    str | None, typer.Option("--units", metavar="U", help="What a length of 1 is in the files: mm, m, in, ...")
-]
-Directions = Annotated[
-    str | None,
-    typer.Option("--directions", metavar="D", help="Straight ways out: +z,-x or axes (default), contacts, a number."),
-]
-PathsOption = Annotated[
-    Paths | None, typer.Option("--paths", help="Straight lines only (default), or any path where none is free.")
-]
-Groups = Annotated[bool | None, typer.Option("--groups", help="Let parts leave together, and come apart later.")]
-Gravity = Annotated[
-    bool | None, typer.Option("--gravity/--no-gravity", help="Whether what stays must stand by itself (default).")
-]
-Held = Annotated[int | None, typer.Option("--held", metavar="K", help="Parts that may be held meanwhile; default 0.")]
-Fixed = Annotated[
-    list[str] | None, typer.Option("--fixed", metavar="NAME", help="A part that stays. May be repeated.")
-]
 
 
-def removal_options(
-    directions: str | None,
-    paths: Paths | None,
-    groups: bool | None,
-    gravity: bool | None,
-    held: int | None,
-    fixed: list[str] | None,
-) -> dict[str, Any]:
-    """The options that were given, as `problem` of the domain "assembly" takes them."""
-    given = {
-        "directions": directions,
-        "paths": None if paths is None else paths.value,
-        "groups": groups,
-        "gravity": gravity,
-        "held": held,
-        "fixed": fixed or None,
-    }
-    return {name: value for name, value in given.items() if value is not None}
+@dataclass(frozen=True)
+class FileOptions:
+    """How an assembly's files are read, where they leave it open."""
+
+    units: Annotated[
+        str | None, typer.Option("--units", metavar="U", help="What a length of 1 is in the files: mm, m, in, ...")
+    ] = None
+    up: Annotated[Up | None, typer.Option("--up", help="What is up in the files; default z, in glTF y.")] = None
+    touch: Annotated[
+        float | None,
+        typer.Option(
+            "--touch",
+            metavar="SHARE",
+            min=1e-6,
+            max=0.5,
+            help="Faces so near, or overlapping so little, touch: a share of the smallest part's extent. Default 0.001, "
+            "raised where mating faces overlap.",
+        ),
+    ] = None
+    friction: Annotated[
+        float | None, typer.Option("--friction", metavar="MU", min=0.0, help="Coulomb's coefficient; default 0.5.")
+    ] = None
+    puzzle: Annotated[
+        int | None, typer.Option("--puzzle", metavar="N", min=1, help="Which problem of a puzzle's file; default 1.")
+    ] = None
+    solution: Annotated[
+        int | None, typer.Option("--solution", metavar="N", min=1, help="Which of its solutions; default 1.")
+    ] = None
+
+    def reading(self) -> Reading:
+        """As the library takes them."""
+        from neurosym.assembly_files import Reading
+
+        return Reading(**{**vars(self), "up": None if self.up is None else self.up.value})
+
+    def refuse_for(self, family: str) -> None:
+        """Say that a problem family has no files to read, if any of them was given.
+
+        Raises:
+            InputError: one was.
+        """
+        for name, value in vars(self).items():
+            if value is not None:
+                raise InputError(f"Expected --{name} with the files of an assembly; {family!r} is a problem family.")
 
 
-def load_assembly(path: Path, units: str | None) -> Assembly:
+@dataclass(frozen=True)
+class RemovalOptions:
+    """How an assembly may be taken apart."""
+
+    directions: Annotated[
+        str | None,
+        typer.Option(
+            "--directions", metavar="D", help="Straight ways out: +z,-x or axes (default), contacts, a number."
+        ),
+    ] = None
+    paths: Annotated[
+        Paths | None, typer.Option("--paths", help="Straight lines only (default), or any path where none is free.")
+    ] = None
+    groups: Annotated[
+        bool | None, typer.Option("--groups", help="Let several parts leave together, and come apart later.")
+    ] = None
+    gravity: Annotated[
+        bool | None, typer.Option("--gravity/--no-gravity", help="Whether what stays must stand by itself (default).")
+    ] = None
+    held: Annotated[
+        int | None, typer.Option("--held", metavar="K", help="Parts that may be held meanwhile; default 0.")
+    ] = None
+    fixed: Annotated[
+        list[str] | None, typer.Option("--fixed", metavar="NAME", help="A part that stays. May be repeated.")
+    ] = None
+
+    def given(self) -> dict[str, Any]:
+        """Those that were given, as `problem` of the domain "assembly" takes them."""
+        named = {**vars(self), "paths": None if self.paths is None else self.paths.value}
+        return {name: value for name, value in named.items() if value is not None and value != []}
+
+
+def load_assembly(path: Path, files: FileOptions) -> Assembly:
     """The assembly in a file or folder.
 
     Raises:
         InputError: there is nothing at that path, or it cannot be used.
     """
-    from neurosym.geometry.assembly import Assembly
-
     if not path.exists():
         raise InputError(f"Expected a file or a folder with an assembly; there is nothing at {path}.")
-    return Assembly.load(path, units=units)
+    return files.reading().load(path)
 
 
-def problem_at(path: Path, units: str | None, options: dict[str, Any]) -> Problem:
+def problem_at(path: Path, files: FileOptions, options: dict[str, Any]) -> Problem:
     """The problem of taking apart the assembly at a path."""
     from neurosym.registry import load_domain
 
-    return load_domain("assembly").problem(load_assembly(path, units), name=path.resolve().name, **options)
+    return load_domain("assembly").problem(load_assembly(path, files), name=path.resolve().name, **options)

@@ -6,18 +6,7 @@ from typing import Annotated
 
 import typer
 
-from neurosym.commands.assemblies import (
-    AssemblyPath,
-    Directions,
-    Fixed,
-    Gravity,
-    Groups,
-    Held,
-    PathsOption,
-    Units,
-    problem_at,
-    removal_options,
-)
+from neurosym.commands.assemblies import AssemblyPath, FileOptions, RemovalOptions, problem_at
 from neurosym.commands.common import AsJson, print_json
 
 #: Default limits: a minute, and as many states as fit into a few hundred megabytes.
@@ -26,13 +15,8 @@ SECONDS, EXPANSIONS = 60.0, 1_000_000
 
 def count(
     path: AssemblyPath,
-    units: Units = None,
-    directions: Directions = None,
-    paths: PathsOption = None,
-    groups: Groups = None,
-    gravity: Gravity = None,
-    held: Held = None,
-    fixed: Fixed = None,
+    files: FileOptions,
+    removal: RemovalOptions,
     seconds: Annotated[float, typer.Option("--seconds", help="Budget: wall-clock time.")] = SECONDS,
     expansions: Annotated[int, typer.Option("--expansions", help="Budget: states looked at.")] = EXPANSIONS,
     as_json: AsJson = False,
@@ -44,7 +28,7 @@ def count(
     from neurosym.pipeline import count_orders
     from neurosym.planner import Budget, Status
 
-    problem = problem_at(path, units, removal_options(directions, paths, groups, gravity, held, fixed))
+    problem = problem_at(path, files, removal.given())
     found = count_orders(problem, budget=Budget(seconds=seconds, expansions=expansions))
     if as_json:
         print_json({"path": str(path), **found.as_json()})

@@ -7,18 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from neurosym.commands.assemblies import (
-    AssemblyPath,
-    Directions,
-    Fixed,
-    Gravity,
-    Groups,
-    Held,
-    PathsOption,
-    Units,
-    problem_at,
-    removal_options,
-)
+from neurosym.commands.assemblies import AssemblyPath, FileOptions, RemovalOptions, problem_at
 from neurosym.commands.common import AsJson, print_json
 from neurosym.errors import InputError
 
@@ -28,6 +17,7 @@ SECONDS = 60.0
 
 def export(
     path: AssemblyPath,
+    *,
     pddl: Annotated[
         Path | None, typer.Option("--pddl", metavar="DIR", help="Write domain.pddl and problem.pddl there.")
     ] = None,
@@ -35,13 +25,8 @@ def export(
         Path | None,
         typer.Option("--graph", metavar="FILE", help="What blocks and touches what: .graphml, .dot or .json."),
     ] = None,
-    units: Units = None,
-    directions: Directions = None,
-    paths: PathsOption = None,
-    groups: Groups = None,
-    gravity: Gravity = None,
-    held: Held = None,
-    fixed: Fixed = None,
+    files: FileOptions,
+    removal: RemovalOptions,
     seconds: Annotated[
         float, typer.Option("--seconds", help="With --pddl: time to look for all that can fall.")
     ] = SECONDS,
@@ -56,7 +41,7 @@ def export(
         raise InputError("Expected --pddl DIR or --graph FILE, or both; got neither.")
     if pddl is not None and pddl.exists() and not pddl.is_dir():
         raise InputError(f"Expected --pddl to be a folder; {pddl} is a file.")
-    problem = problem_at(path, units, removal_options(directions, paths, groups, gravity, held, fixed))
+    problem = problem_at(path, files, removal.given())
     written: list[Path] = []
     said: dict[str, Any] = {}
     if graph is not None:

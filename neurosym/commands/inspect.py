@@ -2,21 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from neurosym.commands.assemblies import (
-    AssemblyPath,
-    Directions,
-    Fixed,
-    Gravity,
-    Groups,
-    Held,
-    Paths,
-    PathsOption,
-    Units,
-    problem_at,
-    removal_options,
-)
+from neurosym.commands.assemblies import AssemblyPath, FileOptions, Paths, RemovalOptions, problem_at
 from neurosym.commands.common import AsJson, print_json
 
 if TYPE_CHECKING:
@@ -29,13 +18,8 @@ SHOWN = 40
 
 def inspect(
     path: AssemblyPath,
-    units: Units = None,
-    directions: Directions = None,
-    paths: PathsOption = None,
-    groups: Groups = None,
-    gravity: Gravity = None,
-    held: Held = None,
-    fixed: Fixed = None,
+    files: FileOptions,
+    removal: RemovalOptions,
     as_json: AsJson = False,
 ) -> None:
     """Say what an assembly is: parts, volumes, contacts, what is free, what is interlocked and why, if it stands.
@@ -45,15 +29,15 @@ def inspect(
     """
     from neurosym.inspection import inspect_problem
 
-    problem = problem_at(path, units, removal_options(directions, None, groups, gravity, held, fixed))
+    problem = problem_at(path, files, replace(removal, paths=None).given())
     found = inspect_problem(problem)
-    level = _level(problem) if paths is Paths.any else None
+    level = _level(problem) if removal.paths is Paths.any else None
     if as_json:
         said = {"path": str(path), "units": problem.world.units, **found.as_json()}
-        print_json(said if paths is not Paths.any else {**said, "level": level})
+        print_json(said if removal.paths is not Paths.any else {**said, "level": level})
         return
     _show(problem, found)
-    if paths is Paths.any:
+    if removal.paths is Paths.any:
         print("No level is known: no moves of groups separate it." if level is None else f"Level {level}.")
 
 

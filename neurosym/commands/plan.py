@@ -10,17 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 import typer
 
-from neurosym.commands.assemblies import (
-    Directions,
-    Fixed,
-    Gravity,
-    Groups,
-    Held,
-    PathsOption,
-    Units,
-    load_assembly,
-    removal_options,
-)
+from neurosym.commands.assemblies import FileOptions, RemovalOptions, load_assembly
 from neurosym.commands.common import (
     AsJson,
     CollapseRule,
@@ -61,6 +51,7 @@ def plan(
             "problem family; `neurosym list` names them.",
         ),
     ],
+    *,
     number: Annotated[int | None, typer.Option("--problem", metavar="N", help="Number of the problem.")] = None,
     cells: Annotated[
         Path | None, typer.Option("--cells", metavar="FILE", help='A puzzle of yours: JSON {"name": [[x,y,z], ...]}.')
@@ -91,13 +82,8 @@ def plan(
     removed: Annotated[
         list[str] | None, typer.Option("--removed", metavar="V", help="Is gone already. May be repeated.")
     ] = None,
-    units: Units = None,
-    directions: Directions = None,
-    paths: PathsOption = None,
-    groups: Groups = None,
-    gravity: Gravity = None,
-    held: Held = None,
-    fixed: Fixed = None,
+    files: FileOptions,
+    removal: RemovalOptions,
     out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="Keep it all as JSON.")] = None,
     as_json: AsJson = False,
 ) -> None:
@@ -120,18 +106,17 @@ def plan(
         before=[pair_of(text) for text in before] if before else None,
         removed=removed or None,
     )
-    options |= removal_options(directions, paths, groups, gravity, held, fixed) | family_options(option)
+    options |= removal.given() | family_options(option)
     source: dict[str, Any] = {}
     if path is None:
-        if units is not None:
-            raise InputError(f"Expected --units with the files of an assembly; {what!r} is a problem family.")
+        files.refuse_for(what)
         problem = _problem(family, number, cells, options)
         # Pieces of the user's own travel with their plan, so that it can be shown and replayed.
         source = {} if cells is None else {"cells": cells_in(cells)}
     else:
-        assembly = load_assembly(path, units)
+        assembly = load_assembly(path, files)
         problem = _made(family, assembly, options | {"name": path.resolve().name})
-        source = {"assembly": reference(path, units, assembly)}
+        source = {"assembly": reference(path, files.reading(), assembly)}
     if prior is None:
         prior = NO_PRIOR if path is None else UNTRAINED
     chosen = planner or ("backtracking" if k is None else "best-first")

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from neurosym.commands.assemblies import FileOptions, load_assembly
 from neurosym.commands.common import CollapseRule, FamilyOptions, family_options, progress_bar
 from neurosym.errors import InputError
 
@@ -23,6 +24,7 @@ def render(
         str,
         typer.Argument(metavar="PATH|DOMAIN", help="An assembly of yours, or a family; --plan says which problem."),
     ],
+    *,
     plan: Annotated[
         Path | None, typer.Option("--plan", metavar="PLAN", help="What `neurosym plan --out` wrote.")
     ] = None,
@@ -31,7 +33,7 @@ def render(
     ] = None,
     option: FamilyOptions = None,
     collapse: CollapseRule = None,
-    units: Annotated[str | None, typer.Option("--units", metavar="U", help="Of the files' lengths: mm, m, in.")] = None,
+    files: FileOptions,
     out: Annotated[
         Path | None,
         typer.Option("--out", metavar="FILM", help="A film of the plan: .gif, .mp4 (extra `video`), or a folder."),
@@ -67,7 +69,7 @@ def render(
     if size is not None:
         width, height = _two(size, r"(\d{2,4})x(\d{2,4})", "--size WxH, as 640x480")
         film_size = still_size = (int(width), int(height))
-    staging, title = _staging(what, plan, number, units, {"collapse": collapse, **family_options(option)})
+    staging, title = _staging(what, plan, number, files, {"collapse": collapse, **family_options(option)})
     if exploded is not None:
         picture = exploded_view(staging, spread=spread, size=still_size, camera=camera, title=title)
         print(f"{still(picture, exploded)}: {title}, {len(staging.assembly)} parts pulled apart.")
@@ -79,15 +81,15 @@ def render(
 
 
 def _staging(
-    what: str, plan: Path | None, number: int | None, units: str | None, options: dict[str, Any]
+    what: str, plan: Path | None, number: int | None, files: FileOptions, options: dict[str, Any]
 ) -> tuple[Staging, str]:
     from neurosym.motions import stage
     from neurosym.plan_files import read_plan
 
     given = {key: value for key, value in options.items() if value is not None}
     if plan is None:
-        return _at_rest(what, number, units, given)
-    if number is not None or given:
+        return _at_rest(what, number, files, given)
+    if number is not None or given or files.reading().as_json():
         raise InputError("Expected either --plan, which names its problem, or --problem with its options; got both.")
     saved = read_plan(plan)
     domain = saved.document["domain"]
@@ -96,15 +98,16 @@ def _staging(
     return stage(saved.problem, saved.plan, saved.how), saved.problem.name
 
 
-def _at_rest(what: str, number: int | None, units: str | None, options: dict[str, Any]) -> tuple[Staging, str]:
+def _at_rest(what: str, number: int | None, files: FileOptions, options: dict[str, Any]) -> tuple[Staging, str]:
     """The assembly alone."""
     from neurosym.geometry.assembly import Assembly
     from neurosym.motions import Staging
     from neurosym.registry import domain_names, load_domain
 
     if what not in domain_names() and Path(what).exists():
-        assembly = Assembly.load(what, units=units)
+        assembly = load_assembly(Path(what), files)
         return Staging(assembly, assembly.names, ()), Path(what).resolve().name
+    files.refuse_for(what)
     problem = load_domain(what).problem(number or 0, **options)
     world = problem.world if isinstance(problem.world, Assembly) else getattr(problem.world, "assembly", None)
     if not isinstance(world, Assembly):

@@ -10,16 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from neurosym.commands.assemblies import (
-    Directions,
-    Fixed,
-    Gravity,
-    Groups,
-    Held,
-    PathsOption,
-    Units,
-    removal_options,
-)
+from neurosym.commands.assemblies import FileOptions, RemovalOptions
 from neurosym.commands.common import CollapseRule, FamilyOptions, Oracle, OracleName, family_options, say
 from neurosym.commands.plan import cells_in, pair_of
 from neurosym.errors import InputError
@@ -40,6 +31,7 @@ def view(
             help="A plan.json, an assembly of yours as for `plan`, or a problem family (`neurosym list` names them).",
         ),
     ],
+    *,
     number: Annotated[
         int | None, typer.Option("--problem", metavar="N", help="Number of the domain's problem; default 0.")
     ] = None,
@@ -63,13 +55,8 @@ def view(
     removed: Annotated[
         list[str] | None, typer.Option("--removed", metavar="V", help="Is gone already. May be repeated.")
     ] = None,
-    units: Units = None,
-    directions: Directions = None,
-    paths: PathsOption = None,
-    groups: Groups = None,
-    gravity: Gravity = None,
-    held: Held = None,
-    fixed: Fixed = None,
+    files: FileOptions,
+    removal: RemovalOptions,
     oracle: OracleName = Oracle.geometry,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Breaks ties; the same seed gives the same plan.")] = 0,
     seconds: Annotated[float | None, typer.Option("--seconds", help="Budget: wall-clock time.")] = None,
@@ -99,13 +86,12 @@ def view(
         "collapse": collapse,
         "before": [pair_of(text) for text in before] if before else None,
         "removed": removed or None,
-        "units": units,
     }
     options = {name: value for name, value in named.items() if value is not None}
     query = Query(
         domain=target,
         number=number,
-        options=options | removal_options(directions, paths, groups, gravity, held, fixed) | family_options(option),
+        options=options | removal.given() | family_options(option),
         planner=planner,
         prior=None if prior == "none" else prior,
         oracle=oracle.value,
@@ -114,7 +100,7 @@ def view(
         attempts=attempts,
     )
     check_query(query)
-    source = open_source(query, None if cells is None else cells_in(cells))
+    source = open_source(query, None if cells is None else cells_in(cells), files.reading())
     if prior is None and source.saved is None:
         source = replace(source, query=replace(source.query, prior=source.usual_prior))
     shown = None if source.saved is None else Shown.saved(source.saved)

@@ -171,7 +171,7 @@ class Assembly:
             tolerances: kept as they are where given. Otherwise touch is raised, to at most 5% of the smallest extent,
                 so that mating faces that overlap a little at rest count as touching; `notes` says by how much.
             friction: Coulomb's coefficient; None: the file's, else 0.5.
-            up: "y" or "z", what is up in a glTF file; None: see `neurosym.geometry.formats.gltf`.
+            up: "y" or "z", what is up in the files; None: z, but in glTF see `neurosym.geometry.formats.gltf`.
             problem, solution: which of a puzzle file's, counted from 1.
 
         Returns:

@@ -18,7 +18,7 @@ from neurosym.geometry import collision, triangles
 from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.formats.assembly_json import read_json
 from neurosym.geometry.formats.burrtools import read_xmpuzzle
-from neurosym.geometry.formats.contents import Contents, RawMesh
+from neurosym.geometry.formats.contents import Y_UP, Contents, RawMesh
 from neurosym.geometry.formats.folder import MESHES, read_folder, read_mesh
 from neurosym.geometry.formats.gltf import read_gltf
 from neurosym.geometry.formats.names import distinct
@@ -50,6 +50,9 @@ class Options:
     problem: int = 1
     solution: int = 1
 
+
+#: Formats that have a word on what is up themselves; their reader heeds `up`.
+_TURNED_BY_READER = (".glb", ".gltf")
 
 _READERS: dict[str, Callable[[Path, Options], Contents]] = {
     ".glb": lambda path, options: read_gltf(path, up=options.up),
@@ -115,14 +118,32 @@ def _read(source: Path, options: Options) -> Contents:
     if not exists:
         raise AssemblyError(f"Expected a folder of meshes or a file; there is none at {source}.")
     if is_folder:
-        return read_folder(source)
+        contents = read_folder(source)
+        return _upright(contents) if options.up == "y" else contents
     if source.suffix.lower() not in _READERS:
         known = ", ".join(_READERS)
         raise AssemblyError(f"Expected a folder of meshes, or a file that ends in {known}; got {source.name!r}.")
+    if options.up == "y" and source.suffix.lower() == ".json":
+        raise InputError(f'Expected no up="y" with {source.name}: in an assembly\'s JSON z is up.')
     contents = _READERS[source.suffix.lower()](source, options)
+    if options.up == "y" and source.suffix.lower() not in _TURNED_BY_READER:
+        contents = _upright(contents)
     if not contents.parts:
         raise AssemblyError(f"Expected at least one part in {source}; it has none. Export solids or meshes.")
     return contents
+
+
+def _upright(contents: Contents) -> Contents:
+    """The contents of a file in which y is up, turned so that z is."""
+    parts: list[RawMesh | Part] = []
+    for part in contents.parts:
+        if isinstance(part, RawMesh) and part.X_WP is None:
+            parts.append(replace(part, vertices=part.vertices @ Y_UP[:3, :3].T))
+        else:
+            assert part.X_WP is not None
+            parts.append(replace(part, X_WP=Y_UP @ part.X_WP))
+    note = Note("", "axes", 0.0, "y is up in the file, as was said: turned so that z is.")
+    return replace(contents, parts=tuple(parts), notes=(note, *contents.notes))
 
 
 # -- units ----------------------------------------------------------------------------------------------------
@@ -242,7 +263,8 @@ def _mating(assembly: Assembly, stated: bool) -> tuple[Tolerances, list[Note], l
             depth,
             f"Parts {a!r} and {b!r} overlap by {depth:.4g}, {depth / smallest:.2g} of the smallest extent of any part; "
             f"mating faces may by {limit:g} of it.",
-            f"Move them apart; if they are meant to mate so, state Tolerances(touch={1.1 * depth / smallest:.2g}).",
+            f"Move them apart; if they are meant to mate so, state Tolerances(touch={1.1 * depth / smallest:.2g}), --touch "
+            "on the command line.",
             b,
         )
         for (a, b), depth in deepest.items()
@@ -291,6 +313,6 @@ def _floating(assembly: Assembly) -> list[Note]:
         above = float(bounds[own, 0, 2].min() - assembly.ground)
         said = f"Part {name!r} touches nothing: it is {above:.4g} above the ground"
         said += f", and {least:.4g} from {nearest!r}, the nearest part." if nearest else "."
-        remedy = "Move it, fix it, or state a larger Tolerances(touch=)."
+        remedy = "Move it, fix it, or state a larger Tolerances(touch=), --touch on the command line."
         notes.append(Note(name, "floating", min(above, least), said, remedy))
     return notes

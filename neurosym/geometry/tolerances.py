@@ -4,6 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
+from neurosym.errors import InputError
+
 
 @dataclass(frozen=True)
 class Tolerances:
@@ -29,6 +33,11 @@ class Tolerances:
     mate_angle: float = 0.1
     parallel: float = 1e-4
     patch_shrink: float = 0.02
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            if not 0.0 <= value < np.inf:
+                raise InputError(f"Expected the tolerance {name} as a number of 0 or more; got {value!r}.")
 
 
 DEFAULT_TOLERANCES = Tolerances()

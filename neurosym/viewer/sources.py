@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from neurosym.assembly_files import Reading
 from neurosym.errors import InputError, UnknownNameError
 from neurosym.language.domain import Problem
 from neurosym.plan_files import SavedPlan, problem_of, read_document, read_plan
@@ -41,19 +42,24 @@ class Source:
     usual_prior: str | None = None
 
 
-def open_source(query: Query, cells: Mapping[str, Any] | None = None) -> Source:
+def open_source(query: Query, cells: Mapping[str, Any] | None = None, reading: Reading | None = None) -> Source:
     """Open the domain, or the file at the path, that `query.domain` names; a path wins where no problem is named.
 
     Args:
         cells: a puzzle of the user's own for a domain of polycubes, {name: [(x, y, z), ...]}.
+        reading: how an assembly at a path is read.
 
     Raises:
         UnknownNameError: neither a domain nor a path.
-        InputError: a file that is neither a plan nor an assembly.
+        InputError: a file that is neither a plan nor an assembly; a reading with anything but an assembly.
     """
-    path = Path(query.domain)
+    path, reading = Path(query.domain), reading or Reading()
     if path.exists() and query.number is None and cells is None:
-        return _plan_at(path, query) if _is_plan(path) else _assembly_at(path, query)
+        if not _is_plan(path):
+            return _assembly_at(path, query, reading)
+        _refuse(reading, "a plan's file says how its assembly is read")
+        return _plan_at(path, query)
+    _refuse(reading, f"{query.domain!r} is a problem family")
     if query.domain not in domain_names():
         hint = f"There is no file or folder {query.domain!r} either."
         raise UnknownNameError("domain", query.domain, domain_names(), hint=hint)
@@ -61,6 +67,12 @@ def open_source(query: Query, cells: Mapping[str, Any] | None = None) -> Source:
         return _puzzle(query, cells)
     query = replace(query, number=query.number or 0)
     return Source(query, problem_maker(query, {})(), {})
+
+
+def _refuse(reading: Reading, because: str) -> None:
+    given = reading.as_json()
+    if given:
+        raise InputError(f"Expected {', '.join(given)} with the files of an assembly; {because}.")
 
 
 def _puzzle(query: Query, cells: Mapping[str, Any]) -> Source:
@@ -106,11 +118,11 @@ def _again(document: Mapping[str, Any], path: Path) -> Maker:
     return make
 
 
-def _assembly_at(path: Path, query: Query) -> Source:
-    family = load_domain(ASSEMBLY)
+def _assembly_at(path: Path, query: Query, reading: Reading) -> Source:
+    family, called = load_domain(ASSEMBLY), path.resolve().name
 
     def make(**options: Any) -> Problem:
-        return family.problem(path, **options)
+        return family.problem(reading.load(path), **{"name": called, **options})
 
     name = _name_for(path)
     query = replace(query, domain=name)

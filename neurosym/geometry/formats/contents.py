@@ -35,6 +35,9 @@ MAX_TOTAL_FACES = 10_000_000
 #: Parts of one assembly, fixed ones included.
 MAX_PARTS = 10_000
 
+#: From y up to z up, float64 (4, 4): x stays, y becomes z.
+Y_UP = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
+
 #: Rounding of coordinates stored in 32 and in 64 bits, as a share of their size.
 FLOAT32, FLOAT64 = 2.0**-24, 2.0**-53
 

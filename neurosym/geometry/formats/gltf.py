@@ -25,6 +25,7 @@ from neurosym.geometry.formats.contents import (
     MAX_BYTES,
     MAX_FACES,
     MAX_TEXT_BYTES,
+    Y_UP,
     Contents,
     RawMesh,
     inside,
@@ -45,9 +46,6 @@ _TRIANGLES, _STRIP, _FAN = 4, 5, 6
 
 #: Extensions that change nothing of the shape, by their beginning, and one that is understood.
 _HARMLESS = ("KHR_materials", "KHR_texture", "KHR_lights", "KHR_xmp", "EXT_texture", "KHR_mesh_quantization")
-
-#: From y up to z up: x stays, y becomes z.
-_Y_UP = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
 
 
 def read_gltf(path: Path, *, up: str | None = None) -> Contents:
@@ -70,7 +68,7 @@ def parse_gltf(data: bytes, path: Path, *, up: str | None = None) -> Contents:
             raise too_large(path, MAX_TEXT_BYTES)
         scene = _Scene(json.loads(text.decode("utf-8")), binary, path)
         up = up or ("z" if "trimesh" in scene.generator else "y")
-        root = _Y_UP if up == "y" else np.eye(4)
+        root = Y_UP if up == "y" else np.eye(4)
         said = "y is up, as glTF has it: turned so that z is" if up == "y" else "z is taken to be up, unturned"
         note = Note("", "axes", 0.0, f"{path.name}: {said}.", "Load it with up='z' or up='y' if that is wrong.")
         return Contents(tuple(scene.parts(root)), "m", notes=(note, *scene.notes))
