@@ -17,7 +17,7 @@ import neurosym as ns
 from neurosym.cli import main
 from neurosym.errors import InputError, UnknownNameError
 from neurosym.geometry.falls import find_falls
-from neurosym.language import pddl_strips
+from neurosym.language import pddl_gravity
 from neurosym.language.domain import Problem
 from neurosym.language.pddl import PddlTask, as_pddl, write_pddl
 from neurosym.language.pddl_names import RESERVED, Names
@@ -208,7 +208,7 @@ def test_names_are_identifiers_and_never_the_same() -> None:
 
 def test_helpers_take_over_where_disjunctions_multiply(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     problem = PROBLEMS["sample 2, gravity"]
-    monkeypatch.setattr(pddl_strips, "MAX_OPERATORS", 1)
+    monkeypatch.setattr(pddl_gravity, "MAX_OPERATORS", 1)
     task = as_pddl(problem)
     assert None in task.actions.values()
     assert orders(task, tmp_path) == count_orders(problem).orders
