@@ -9,10 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import learned_priors
 import neurosym as ns
 from neurosym import __version__
 from neurosym.cli import main
 from neurosym.exit_codes import BAD_INPUT, EXIT_CODES, INTERRUPTED
+from neurosym.weights_header import read_header
 
 #: The L before all others: under the rule `cubes` no order of cube 17 can.
 IMPOSSIBLE = [part for other in "VTZABP" for part in ("--before", f"L,{other}")]
@@ -240,6 +242,19 @@ def test_list_names_everything_registered(capsys):
     assert list(listed["planners"]) == ns.planner_names()
     assert sorted(listed["priors"]) == ns.prior_names()
     assert listed["planners"]["best-first"]["complete"] is True
+    assert listed["priors"]["random"].startswith("Believes in one random permutation")
+    assert listed["priors"]["tcn-paper"].startswith("The paper's BC+TCN")
+    files = (Path(learned_priors.__file__).parent / "weights").glob("*.safetensors")
+    headers = [read_header(path) for path in files]
+    assert {(d, p) for d, priors in listed["weights"].items() for p in priors} == {
+        (header["domain"], header["prior"]) for header in headers
+    }
+
+
+def test_list_loads_no_network_library():
+    code = "import sys, neurosym.cli as c\ntry: c.main(['list'])\nexcept SystemExit: print('torch' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "False"
 
 
 @pytest.fixture(scope="module")

@@ -51,8 +51,8 @@ class FileOptions:
             metavar="SHARE",
             min=1e-6,
             max=0.5,
-            help="Faces so near, or overlapping so little, touch: a share of the smallest part's extent. Default 0.001, "
-            "raised where mating faces overlap.",
+            help="Faces so near, or overlapping so little, touch: a share of the smallest part's extent. "
+            "Default 0.001, raised where mating faces overlap.",
         ),
     ] = None
     friction: Annotated[

@@ -12,28 +12,34 @@ from neurosym.exit_codes import UNWELL
 
 
 def names(as_json: AsJson = False) -> None:
-    """List domains, planners with what they claim, and priors."""
+    """List domains, planners with what they claim, priors, and the domains that there are trained weights for."""
     from importlib.metadata import entry_points
 
-    from neurosym.registry import PRIORS, domain_names, load_domain, load_planner, planner_names
+    from neurosym.catalogue import summary, weights_beside
+    from neurosym.registry import DOMAINS, PRIORS, domain_names, load_domain, load_planner, planner_names
 
     domains = {name: load_domain(name).reference for name in domain_names()}
     planners = {name: asdict(load_planner(name).traits) for name in planner_names()}
-    # Only their declarations are read: loading a learned prior would wait for its network library.
-    priors = {entry.name: entry.value for entry in entry_points(group=PRIORS)}
+    declared = sorted(entry_points(group=PRIORS))
+    priors = {entry.name: summary(entry) for entry in declared}
+    weights: dict[str, list[str]] = {}
+    for entry in declared:
+        weights |= weights_beside(entry)
     if as_json:
-        print_json({"domains": domains, "planners": planners, "priors": priors})
+        print_json({"domains": domains, "planners": planners, "priors": priors, "weights": weights})
         return
     out = console()
     sections: dict[str, dict[str, str]] = {
-        "domains": domains,
+        "domains": {entry.name: summary(entry) for entry in sorted(entry_points(group=DOMAINS))},
         "planners": {name: _claims(traits) for name, traits in planners.items()},
-        "priors": dict(sorted(priors.items())),
+        "priors": priors,
+        "trained weights": {domain: ", ".join(names) for domain, names in weights.items()},
     }
+    width = max(len(name) for entries in sections.values() for name in entries)
     for title, entries in sections.items():
         out.print(f"[bold]{title}[/bold]")
         for name, said in entries.items():
-            out.print(f"  {name:<16} {said}", soft_wrap=True)
+            out.print(f"  {name:<{width}}  {said}", soft_wrap=True)
 
 
 def _claims(traits: dict[str, Any]) -> str:
