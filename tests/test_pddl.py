@@ -60,6 +60,22 @@ def not_in_the_middle(world: ns.Assembly, state: Any, name: str) -> ns.Verdict:
     return ns.Verdict(name in (there[0], there[-1]) or len(there) <= 3)
 
 
+def two_actions(world: ns.Assembly) -> Problem:
+    """Each part can be lifted or pushed out."""
+    ways = {"lift": "+z", "push": "-x,+x"}
+    stands = ns.predicates.stable_without(present)(p)
+    actions = [
+        ns.Action(n, p, pre=[present(p), ns.predicates.free(present, directions=d)(p), stands], eff=[~present(p)])
+        for n, d in ways.items()
+    ]
+    return ns.Domain("two actions", fluents=[present], actions=actions).problem(
+        world=world,
+        objects={part: world.names},
+        init=[present(n) for n in world.names],
+        goal=[~present(n) for n in world.names],
+    )
+
+
 def tower_of(*names: str) -> ns.Assembly:
     return ns.Assembly.from_cells({name: [(0, 0, z)] for z, name in enumerate(names)})
 
@@ -100,7 +116,9 @@ def problems() -> dict[str, Problem]:
             ns.Assembly.from_cells({"low": [(0, 0, 0)], "high": [(0, 0, 1), (1, 0, 1), (2, 0, 1)], "by": [(5, 0, 0)]}),
             predicates.stable_without(present),
         ),
+        "two actions": two_actions(random_heap(108)),
         "impossible": ASSEMBLY.problem(ns.Assembly.from_cells(SHUT)),
+        "impossible from the start": ASSEMBLY.problem(ns.Assembly.from_cells(SHUT), fixed=["box"]),
         "impossible under gravity": ASSEMBLY.problem(4, before=[("lever", "left")]),
     }
 

@@ -6,6 +6,7 @@ would resist is gone; so a part of it must have left, or one that resists must s
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -132,18 +133,20 @@ def _avert(
     that must be gone. One that can happen at first must be made impossible by the first removal already.
 
     Args:
-        removals: names of parts, and what removes them.
+        removals: names of parts, and what removes them; one part may have several.
     """
-    remover = dict(removals)
+    removers: dict[str, list[Instance]] = {}
+    for part, instance in removals:
+        removers.setdefault(part, []).append(instance)
     averted: dict[int, Fact] = {}
     for number, fall in enumerate(falls):
-        can_leave = [n for n in world.in_mask(fall.moving) if n in remover]
+        can_leave = [n for n in world.in_mask(fall.moving) if n in removers]
         if len(can_leave) == 1:
             averted[number] = ~present(can_leave[0])
         elif can_leave:
-            averted[number] = Mark("averted", str(number))
-            for name in can_leave:
-                remover[name].marks.add(Mark("averted", str(number)))
+            averted[number] = mark = Mark("averted", str(number))
+            for instance in itertools.chain.from_iterable(removers[n] for n in can_leave):
+                instance.marks.add(mark)
     kept: dict[Mark, set[Fact]] = {}
     for part, instance in removals:
         bit = 1 << world.index[part]
@@ -155,7 +158,7 @@ def _avert(
                 if any(~present(n) in way for n in world.in_mask(fall.moving)):
                     continue
                 stay = world.in_mask(fall.gone & ~bit)
-                if any(n not in remover or Literal(present(n)) in way for n in stay):
+                if any(n not in removers or Literal(present(n)) in way for n in stay):
                     continue
                 choices: set[Fact] = {Literal(present(n)) for n in stay if ~present(n) not in way}
                 if number in averted:
