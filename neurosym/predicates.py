@@ -1,6 +1,6 @@
 """Ready-made geometric predicates for domains whose world is an `Assembly`.
 
-Each is made from the fluent that says which parts are there::
+Each is made from the fluent that says which parts are there:
 
     free, stable_without = ns.predicates.free(present), ns.predicates.stable_without(present)
 

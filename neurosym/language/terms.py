@@ -139,10 +139,10 @@ class Derived(_Predicate):
 
 
 def derived(*types: Type) -> Callable[[Callable[..., Verdict]], Derived]:
-    """Make a predicate of one's own from a function ``(world, state, *names) -> Verdict``::
+    """Make a predicate of one's own from a function ``(world, state, *names) -> Verdict``:
 
-    @ns.derived(part)
-    def light_enough(world, state, p): ...
+        @ns.derived(part)
+        def light_enough(world, state, p): ...
     """
 
     def decorate(function: Callable[..., Verdict]) -> Derived:
