@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from neurosym.errors import AssemblyError, UnknownNameError
+from neurosym.geometry.cells import parts_from_cells
 from neurosym.geometry.notes import Note
 from neurosym.geometry.shapes import Array as Array
 from neurosym.geometry.shapes import Body as Body
@@ -38,9 +39,6 @@ T = TypeVar("T")
 
 #: The height of a table that is not there: infinitely far down, where nothing touches it.
 NO_TABLE = float("-inf")
-
-#: Cells farther from the origin than this are refused: lengths would lose their last digits.
-MAX_COORDINATE = 1_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,28 +100,7 @@ class Assembly:
             AssemblyError: an empty part, a cell that comes twice or belongs to two parts, or that is no triple
                 of integers.
         """
-        if not np.isfinite(size) or size <= 0:
-            raise AssemblyError(f"Expected a cell size above 0; got {size!r}.")
-        owner: dict[tuple[int, int, int], str] = {}
-        parts = []
-        if not isinstance(cells, Mapping):
-            raise AssemblyError(f"Expected parts as {{name: [(x, y, z), ...]}}; got {cells!r}.")
-        for name, given in cells.items():
-            if not isinstance(name, str) or not name:
-                raise AssemblyError(f"Expected names of parts that are text; got {name!r}.")
-            if not isinstance(given, Iterable):
-                raise AssemblyError(f"Part {name!r}: expected a list of cells (x, y, z); got {given!r}.")
-            triples = [_cell(name, c) for c in given]
-            if not triples:
-                raise AssemblyError(f"Expected part {name!r} to have at least one cell; it is empty.")
-            for cell in triples:
-                if cell in owner:
-                    other = owner[cell]
-                    said = "comes twice" if other == name else f"belongs to {other!r} too: the parts overlap"
-                    raise AssemblyError(f"Part {name!r}: the cell {cell} {said}. Give each cell to one part, once.")
-                owner[cell] = name
-            parts.append(boxes_part(name, (np.array(triples) + 0.5) * size, np.full(3, size)))
-        return cls(tuple(parts), table, friction, tolerances)
+        return cls(parts_from_cells(cells, size), table, friction, tolerances)
 
     @classmethod
     def from_meshes(
@@ -335,15 +312,9 @@ class Assembly:
 
         These are the axes of its boxes, up to sign, and the vertical; without boxes, the world's axes.
         """
-        found = [np.array([0.0, 0.0, 1.0])]
-        rotations = [X[:3, :3].T for X, b in zip(self.X_WB, self.bodies) if isinstance(b.shape, Box)]
-        candidates = np.concatenate(rotations) if rotations else np.eye(3)
-        for axis in np.unique(np.round(candidates, 9), axis=0):
-            if all(np.linalg.norm(np.cross(axis, other)) > self.tolerances.parallel for other in found):
-                found.append(axis / np.linalg.norm(axis))
-        both = np.array([s * a for a in found for s in (1.0, -1.0)])
-        both[np.abs(both) < 1e-12] = 0.0
-        return both[np.lexsort((-both[:, 0], -both[:, 1], -both[:, 2].round(9)))]
+        from neurosym.geometry.directions import built_axes
+
+        return built_axes(self)
 
     def mask(self, names: Iterable[str]) -> int:
         """A bitset of parts."""
@@ -397,20 +368,6 @@ class Assembly:
         state = {k: v for k, v in self.__dict__.items() if k in self.__dataclass_fields__}
         state["_cache"] = {}
         return state
-
-
-def _cell(name: str, cell: Sequence[int]) -> tuple[int, int, int]:
-    try:
-        array = np.asarray(cell)
-        whole = array.shape == (3,) and bool(np.isfinite(array).all() and (array == np.round(array)).all())
-    except (TypeError, ValueError):
-        whole = False
-    if not whole:
-        raise AssemblyError(f"Part {name!r}: expected cells (x, y, z) of three integers; got {cell!r}.")
-    if np.abs(array).max() > MAX_COORDINATE:
-        raise AssemblyError(f"Part {name!r}: expected cells within {MAX_COORDINATE:,} of the origin; got {cell!r}.")
-    x, y, z = (int(v) for v in array)
-    return x, y, z
 
 
 def _rigid(X: ArrayLike) -> Array:

@@ -12,6 +12,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from neurosym.errors import InputError
+from neurosym.geometry.shapes import Box
 
 if TYPE_CHECKING:
     from neurosym.geometry.assembly import Assembly
@@ -72,6 +73,19 @@ def _word(assembly: Assembly, word: str) -> Array:
     if len(word) == 2 and word[0] in "+-" and word[1] in "xyz":
         return np.eye(3)[["xyz".index(word[1])]] * (1.0 if word[0] == "+" else -1.0)
     raise InputError(f"Expected directions as {_WORDS}; got {word!r}.")
+
+
+def built_axes(assembly: Assembly) -> Array:
+    """The axes of the assembly's boxes and the vertical, as `Assembly.axes` keeps them."""
+    found = [np.array([0.0, 0.0, 1.0])]
+    rotations = [X[:3, :3].T for X, b in zip(assembly.X_WB, assembly.bodies) if isinstance(b.shape, Box)]
+    candidates = np.concatenate(rotations) if rotations else np.eye(3)
+    for axis in np.unique(np.round(candidates, 9), axis=0):
+        if all(np.linalg.norm(np.cross(axis, other)) > assembly.tolerances.parallel for other in found):
+            found.append(axis / np.linalg.norm(axis))
+    both = np.array([s * a for a in found for s in (1.0, -1.0)])
+    both[np.abs(both) < 1e-12] = 0.0
+    return both[np.lexsort((-both[:, 0], -both[:, 1], -both[:, 2].round(9)))]
 
 
 def sampled_directions(count: int) -> Array:
