@@ -17,7 +17,8 @@ from neurosym.planner import MAX_BLAME, Budget, Planner, PlanResult, Status
 from neurosym.prior import OrderScores
 from neurosym.problem import SearchProblem, Step
 from neurosym.registry import load_planner
-from neurosym.testing.toys import Counting, NumberLine, Relabelled, Removal, Table, Tiles, Unproved, brute_force_plans
+from neurosym.testing.toys import NumberLine, Removal, Table, Tiles, brute_force_plans
+from neurosym.testing.wrapped import Counting, Relabelled, Unproved
 
 #: Costs further apart than this (nats) differ. Planners may take costs within 1e-6 nats a plan for equal.
 TOLERANCE = 1e-5

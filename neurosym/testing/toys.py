@@ -5,15 +5,16 @@ They satisfy `SearchProblem`. `brute_force_plans` finds all their plans, and sha
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from typing import Any, Generic, TypeVar
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from neurosym.problem import Rejection, SearchProblem, Step
-
-S = TypeVar("S", bound=Hashable)
+from neurosym.testing.wrapped import Counting as Counting
+from neurosym.testing.wrapped import Relabelled as Relabelled
+from neurosym.testing.wrapped import Unproved as Unproved
 
 
 @dataclass(frozen=True)
@@ -124,35 +125,6 @@ class Removal:
 
 
 @dataclass(frozen=True)
-class Unproved:
-    """A removal whose refusals prove nothing, as those of a search for a path that ended without one."""
-
-    base: Removal
-
-    @property
-    def actions(self) -> tuple[str, ...]:
-        return self.base.actions
-
-    @property
-    def classes(self) -> tuple[int, ...]:
-        return self.base.classes
-
-    @property
-    def initial(self) -> int:
-        return self.base.initial
-
-    def is_goal(self, state: int) -> bool:
-        return self.base.is_goal(state)
-
-    def candidates(self, state: int) -> list[int]:
-        return self.base.candidates(state)
-
-    def attempt(self, state: int, action: int) -> Step[int] | Rejection:
-        answer = self.base.attempt(state, action)
-        return replace(answer, until=(), unconditional=False, proved=False) if isinstance(answer, Rejection) else answer
-
-
-@dataclass(frozen=True)
 class Tiles:
     """Spell one of the words with letter tiles; equal letters are interchangeable.
 
@@ -221,77 +193,6 @@ class Table:
         if key in self.leads:
             return Step(self.leads[key])
         return Rejection(f"{key[1]} leads nowhere from {state}.", self.names.get(key, ()))
-
-
-@dataclass(frozen=True)
-class Relabelled(Generic[S]):
-    """The same problem with its actions in another order: action i here is `order[i]` there."""
-
-    problem: SearchProblem[S]
-    order: tuple[int, ...]
-
-    @property
-    def actions(self) -> tuple[str, ...]:
-        return tuple(self.problem.actions[a] for a in self.order)
-
-    @property
-    def classes(self) -> tuple[int, ...]:
-        return tuple(self.problem.classes[a] for a in self.order)
-
-    @property
-    def initial(self) -> S:
-        return self.problem.initial
-
-    def is_goal(self, state: S) -> bool:
-        return self.problem.is_goal(state)
-
-    def candidates(self, state: S) -> list[int]:
-        return [self.order.index(a) for a in self.problem.candidates(state)]
-
-    def attempt(self, state: S, action: int) -> Step[S] | Rejection:
-        answer = self.problem.attempt(state, self.order[action])
-        if isinstance(answer, Rejection):
-            until = tuple(self.order.index(a) for a in answer.until)
-            return Rejection(answer.reason, answer.because, until, answer.unconditional)
-        return answer
-
-
-@dataclass
-class Counting(Generic[S]):
-    """The same problem, counting what is asked of it, and whether anything was asked that is no candidate."""
-
-    problem: SearchProblem[S]
-    attempts: int = 0
-    refusals: int = 0
-    expansions: int = 0
-    no_candidates: list[tuple[S, int]] = field(default_factory=list)
-
-    @property
-    def actions(self) -> Sequence[str]:
-        return self.problem.actions
-
-    @property
-    def classes(self) -> Sequence[int]:
-        return self.problem.classes
-
-    @property
-    def initial(self) -> S:
-        return self.problem.initial
-
-    def is_goal(self, state: S) -> bool:
-        return self.problem.is_goal(state)
-
-    def candidates(self, state: S) -> list[int]:
-        self.expansions += 1
-        return list(self.problem.candidates(state))
-
-    def attempt(self, state: S, action: int) -> Step[S] | Rejection:
-        self.attempts += 1
-        if action not in self.problem.candidates(state):
-            self.no_candidates.append((state, action))
-        answer = self.problem.attempt(state, action)
-        self.refusals += isinstance(answer, Rejection)
-        return answer
 
 
 def brute_force_plans(problem: SearchProblem[Any]) -> Iterator[tuple[int, ...]]:
