@@ -18,7 +18,7 @@ from neurosym.plotting import (
     scores_figure,
     search_figure,
 )
-from neurosym.plotting.layers import box_width, in_layers
+from neurosym.plotting.layers import box_width, in_layers, shortened
 from neurosym.plotting.search import MOST_REFUSALS, ON_PLAN, REFUSED
 from neurosym.testing.toys import NumberLine
 
@@ -103,6 +103,14 @@ def test_layers_that_are_too_wide_are_staggered_and_no_box_lies_on_another():
     for i, (left, right, y) in enumerate(boxes):
         for other_left, other_right, other_y in boxes[:i]:
             assert abs(y - other_y) > 0.15 or right < other_left or other_right < left
+
+
+def test_a_long_name_keeps_both_ends():
+    assert shortened("short") == "short"
+    names = {shortened(f"left_front_bracket_{k}") for k in range(20)}
+    assert len(names) == 20
+    assert all(len(name) == 14 and name.startswith("left") for name in names)
+    assert [shortened("abcdef", k) for k in (1, 2, 3)] == ["…", "a…", "a…f"]
 
 
 # -- searches -------------------------------------------------------------------------------------------------

@@ -72,8 +72,11 @@ def in_layers(layers: Sequence[Sequence[str]], edges: Sequence[tuple[str, str]],
 
 
 def shortened(name: str, most: int = MOST_LETTERS) -> str:
-    """A name of at most so many letters."""
-    return name if len(name) <= most else name[: most - 1] + "…"
+    """A name of at most so many letters; what is longer loses its middle, as names often differ at their ends."""
+    if len(name) <= most:
+        return name
+    tail = (most - 1) // 2
+    return name[: most - 1 - tail] + "…" + name[len(name) - tail :]
 
 
 def box_width(name: str) -> float:
