@@ -12,12 +12,16 @@ from PIL import Image
 import neurosym as ns
 from neurosym.cli import main
 from neurosym.errors import InputError, MissingDependencyError
-from neurosym.motions import Staging, stage
-from neurosym.simulation import animation, open_clients
-from neurosym.simulation.animation import check_film, frames, still, write_film
+from neurosym.motions import Motion, Staging, stage
+from neurosym.simulation import film_files, open_clients
+from neurosym.simulation.animation import LONGEST, SHORTEST_STEP, frames, pace
 from neurosym.simulation.captions import captioned
 from neurosym.simulation.exploded import explode, exploded_view
-from neurosym.simulation.filming import FilmSet
+from neurosym.simulation.film_files import RATE, check_film, still, write_film
+from neurosym.simulation.filming import DEFAULT_CAMERA, TOPS_CAMERA, FilmSet
+from neurosym.simulation.scene import FIXED, part_colours
+from neurosym.simulation.storyboard import best_camera, company, describe
+from neurosym.testing.burrs import burr
 
 SMALL = (96, 72)
 BRICKS = {"low": [(0, 0, 0), (1, 0, 0)], "high": [(0, 0, 1)]}
@@ -133,10 +137,11 @@ def test_a_film_begins_whole_ends_empty_and_moves_in_between():
     assert counts[-1][0] == counts[-1][1] == len(shots)
     assert len({s.shape for s in shots}) == 1
     assert not shots[0].shape[0] % 2
-    inked = [(s[:72] < 250).any(axis=2).sum() for s in (shots[0], shots[-1])]
+    inked = [(s[:72] < 200).any(axis=2).sum() for s in (shots[0], shots[-1])]
     assert inked[0] > 300 > inked[1]
+    assert (shots[-1][:72] < 250).any(), "what was there is still seen, pale"
     different = sum(not np.array_equal(a, b) for a, b in pairwise(shots))
-    assert different > 7 * animation.RATE // 2
+    assert different > 7 * RATE // 2
 
 
 def test_what_a_tower_gains_arrives():
@@ -144,8 +149,86 @@ def test_what_a_tower_gains_arrives():
     result = ns.solve(problem)
     staging = stage(problem, result.plan)
     shots = list(frames(staging, size=SMALL))
-    inked = [(s[:72] < 250).any(axis=2).sum() for s in (shots[0], shots[-1])]
+    inked = [(s[:72] < 200).any(axis=2).sum() for s in (shots[0], shots[-1])]
     assert inked[0] < 50 < inked[1]
+    assert describe(staging, 0) == f"place {result.plan[0]}, along -z"
+
+
+def test_a_group_leaves_together_and_is_taken_apart_by_itself():
+    pairs = ns.Assembly.from_cells(burr("pairs").cells)
+    problem = ns.load_domain("assembly").problem(pairs, groups=True, gravity=False)
+    result = ns.solve(problem)
+    out = stage(problem, result.plan, result.how)
+    group = next(i for i, motion in enumerate(out.motions) if len(motion.parts) == 2)
+    apart = next(i for i in range(group + 1, 3) if out.motions[i].parts[0] in out.motions[group].parts)
+    assert set(out.motions[group].parts) == {"a", "b"}
+    assert describe(out, group).startswith("remove ")
+    assert " with " in describe(out, group)
+    assert company(out, group) == out.there(group)
+    assert set(company(out, apart)) == {"a", "b"}, "nothing else is in the picture"
+    assert " off " in describe(out, apart)
+    back = stage(problem, result.reversed(), result.reversed().how)
+    assert set(company(back, 2 - apart)) | set(back.motions[2 - apart].parts) == {"a", "b"}, "in the hand"
+    assert not {"a", "b"} & set(company(back, 2 - group)), "and not in its place before it arrives"
+    between = next(i for i in range(3) if i not in (2 - apart, 2 - group))
+    assert not {"a", "b"} & set(company(back, between))
+
+
+def test_what_made_way_goes_back_without_a_jump_and_what_is_held_is_set_off():
+    assembly = ns.Assembly.from_cells({"a": [(0, 0, 0)], "b": [(2, 0, 0)]})
+    path, aside = np.tile(np.eye(4), (2, 1, 1)), np.tile(np.eye(4), (2, 1, 1))
+    path[1, 2, 3], aside[1, 0, 3] = 2.0, 2.0
+    steps = [Motion("a", ("a",), path, aside=((("b",), aside, np.zeros(3)),)), Motion("a", ("a",), path, held=("b",))]
+    shots = []
+    for motion in steps:
+        staging = Staging(assembly, assembly.names, (motion,), {"a": BLUE, "b": RED})
+        shots.append([shot[:72] for shot in frames(staging, size=SMALL)])
+    moving, held, ends = pace(1)
+    columns = [np.flatnonzero(red(shot).any(axis=0)).mean() for shot in shots[0][ends:-ends]]
+    assert columns[moving - 1] > columns[0] + 10
+    back = columns[moving:]
+    assert len(back) == held
+    assert back == sorted(back, reverse=True)
+    assert back[-1] < back[0] - 3
+    pink = [(np.abs(shot.astype(int) - (200, 0, 110)) < 40).all(axis=2).sum() for shot in shots[1]]
+    assert min(pink[ends : ends + moving]) > 10
+    assert max(pink[:ends]) == 0
+    assert describe(Staging(assembly, assembly.names, (steps[1],)), 0) == "remove a, along +z, b held"
+
+
+def test_tiles_show_their_letters_from_a_steeper_side():
+    problem = ns.load_domain("scrabble").problem(5)
+    staging = stage(problem, ns.solve(problem).plan)
+    assert best_camera(staging) is TOPS_CAMERA
+    bare = Staging(staging.assembly, staging.present, staging.motions, staging.colours)
+    shots = [exploded_view(s, size=(240, 180), camera=TOPS_CAMERA, names=False) for s in (staging, bare)]
+    dark = [(shot[:180] < 90).all(axis=2).sum() for shot in shots]
+    assert dark[0] > 2 * dark[1]
+
+
+def test_the_camera_turns_to_the_broad_side():
+    def camera(*cells):
+        assembly = ns.Assembly.from_cells({"bar": list(cells)})
+        return best_camera(Staging(assembly, assembly.names, ())).azimuth
+
+    assert camera((0, 0, 0)) == DEFAULT_CAMERA.azimuth
+    assert camera(*((x, 0, 0) for x in range(4))) < DEFAULT_CAMERA.azimuth < camera(*((0, y, 0) for y in range(4)))
+
+
+def test_many_steps_go_faster_but_can_be_followed():
+    assert pace(7) == (15, 3, 12)
+    moving, held, _ = pace(40)
+    assert 40 * (moving + held) / RATE == pytest.approx(LONGEST, rel=0.15)
+    assert sum(pace(1000)[:2]) / RATE == pytest.approx(SHORTEST_STEP, rel=0.15)
+
+
+def test_many_parts_have_colours_that_are_neither_black_nor_white_and_fixed_ones_are_grey():
+    assembly = ns.Assembly.from_cells({f"{i:02}": [(i, 0, 0)] for i in range(60)}).with_fixed(["07"])
+    colours = part_colours(Staging(assembly, assembly.names, ()))
+    assert colours["07"] == FIXED
+    assert len(set(colours.values())) == 60
+    brightness = [sum(colour) / 3 for colour in colours.values()]
+    assert 0.3 < min(brightness) < max(brightness) < 0.9
 
 
 def test_words_that_do_not_fit_are_cut():
@@ -176,7 +259,7 @@ def test_mp4(tmp_path):
     film = write_film(pictures(30), tmp_path / "a.mp4")
     count, seconds = ffmpeg.count_frames_and_secs(str(film))
     assert count == 30
-    assert seconds == pytest.approx(30 / animation.RATE, abs=0.1)
+    assert seconds == pytest.approx(30 / RATE, abs=0.1)
     assert [p.name for p in tmp_path.iterdir()] == ["a.mp4"]
 
 
@@ -184,7 +267,7 @@ def test_without_ffmpeg_an_mp4_is_refused_with_the_remedy(tmp_path, monkeypatch)
     def missing(name):
         raise ImportError(name)
 
-    monkeypatch.setattr(animation.importlib, "import_module", missing)
+    monkeypatch.setattr(film_files.importlib, "import_module", missing)
     with pytest.raises(MissingDependencyError, match=r"neurosym-assembly\[video\]"):
         check_film(tmp_path / "a.mp4")
 

@@ -46,12 +46,18 @@ def render(
         str | None, typer.Option("--size", metavar="WxH", help="In pixels; default 640x480, and 960x720 for PNG.")
     ] = None,
     view: Annotated[
-        str, typer.Option("--from", metavar="AZIMUTH,ELEVATION", help="Side of the camera, degrees; 0,0 looks from +x.")
-    ] = "-58,24",
+        str | None,
+        typer.Option(
+            "--from",
+            metavar="AZIMUTH,ELEVATION",
+            help="Side of the camera, degrees; 0,0 looks from +x. Default: the front right, from above, about -58,24.",
+        ),
+    ] = None,
 ) -> None:
     """Draw a plan as a film, part by part along its path, or the parts pulled apart."""
-    from neurosym.simulation.animation import check_film, frames, still, write_film
+    from neurosym.simulation.animation import frames
     from neurosym.simulation.exploded import exploded_view
+    from neurosym.simulation.film_files import check_film, still, write_film
     from neurosym.simulation.filming import DEFAULT_CAMERA
     from neurosym.simulation.looks import Camera
 
@@ -63,8 +69,11 @@ def render(
         check_film(out)
     if exploded is not None and exploded.suffix.lower() != ".png":
         raise InputError(f"Expected --exploded FILE.png; got {str(exploded)!r}.")
-    azimuth, elevation = _two(view, r"(-?\d+(?:\.\d+)?),(-?\d+(?:\.\d+)?)", "--from AZIMUTH,ELEVATION, as -58,24")
-    camera = Camera(azimuth, elevation, field_of_view=DEFAULT_CAMERA.field_of_view)
+    camera = None
+    if view is not None:
+        pattern = r"(-?\d+(?:\.\d+)?),(-?\d+(?:\.\d+)?)"
+        azimuth, elevation = _two(view, pattern, "--from AZIMUTH,ELEVATION, as -58,24")
+        camera = Camera(azimuth, elevation, field_of_view=DEFAULT_CAMERA.field_of_view)
     film_size, still_size = FILM_SIZE, STILL_SIZE
     if size is not None:
         width, height = _two(size, r"(\d{2,4})x(\d{2,4})", "--size WxH, as 640x480")

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from neurosym.errors import InputError
 from neurosym.motions import Staging
 from neurosym.simulation.captions import captioned, label
-from neurosym.simulation.filming import DEFAULT_CAMERA, FilmSet
+from neurosym.simulation.filming import FilmSet
 from neurosym.simulation.looks import Camera
 from neurosym.simulation.scene import part_colours
+from neurosym.simulation.storyboard import best_camera
 
 if TYPE_CHECKING:
     from neurosym.geometry.assembly import Assembly
@@ -78,7 +79,7 @@ def exploded_view(
     *,
     spread: float = 1.0,
     size: tuple[int, int] = (960, 720),
-    camera: Camera = DEFAULT_CAMERA,
+    camera: Camera | None = None,
     title: str = "",
     names: bool = True,
 ) -> Picture:
@@ -86,9 +87,9 @@ def exploded_view(
 
     Args:
         size: width and height in pixels, without the words below.
-        camera: from which side.
+        camera: from which side; None takes `best_camera`.
         title: stands below.
-        names: whether each part's name is written on it (up to `MOST_NAMES` parts).
+        names: whether each part's name is written on it (up to `MOST_NAMES` parts, and unless they bear pictures).
 
     Returns:
         uint8 (height and a line of words, width, 3).
@@ -101,10 +102,16 @@ def exploded_view(
         where[name] = np.eye(4)
         where[name][:3, 3] = shift
     with FilmSet(
-        staging.assembly, part_colours(staging), np.concatenate(corners), size=size, camera=camera, ground=False
+        staging.assembly,
+        part_colours(staging),
+        np.concatenate(corners),
+        size=size,
+        camera=camera or best_camera(staging),
+        ground=False,
+        tops=staging.tops,
     ) as film:
         picture = film.picture(staging.assembly.names, where)
-        if names and len(shifts) <= MOST_NAMES:
+        if names and not staging.tops and len(shifts) <= MOST_NAMES:
             seen = film.seen_at(staging.assembly.names, where)
             picture = label(picture, seen)
     count = len(shifts)

@@ -1,12 +1,15 @@
 """A camera on a plan: parts at any poses, on a ground that takes their shadows, with dark outlines. No window needed.
 
 PyBullet's software renderer draws at twice the size with a number for each pixel's part; outlines come from where
-those numbers change or the surface folds, and the picture is then made smaller, which smooths it.
+those numbers change or the surface folds (see `neurosym.simulation.shading`), and the picture is then made smaller,
+which smooths it.
 """
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Collection, Mapping
+from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
@@ -15,8 +18,9 @@ from numpy.typing import NDArray
 
 from neurosym.errors import InputError
 from neurosym.simulation.client import Client
-from neurosym.simulation.looks import Camera
+from neurosym.simulation.looks import Camera, aimed
 from neurosym.simulation.scene import RGB
+from neurosym.simulation.shading import LIGHT, Single, cast, ink, set_off
 from neurosym.simulation.solids import quaternion
 
 if TYPE_CHECKING:
@@ -29,13 +33,10 @@ Picture = NDArray[np.uint8]
 OVERSAMPLING = 2
 #: From where pictures are taken unless one is told: the front right, from above.
 DEFAULT_CAMERA = Camera(-58, 24, field_of_view=26.0)
-#: Free space around what is shown, as a share of the picture.
-MARGIN = 0.06
-#: Colour of outlines, and how much of it shows (0..1).
-_INK, _INK_SHARE = np.array([38.0, 38.0, 46.0]), 0.75
-#: Towards the light, a unit vector; how dark its shadow on the ground is (grey levels); how soft (a share of the size).
-_LIGHT = np.array([-0.46, -0.50, 0.734])
-_SHADE, _SOFT = 56.0, 0.008
+#: The same where parts bear pictures on their tops, which are to be read.
+TOPS_CAMERA = Camera(-78, 50, field_of_view=26.0)
+#: A picture on a part's top is drawn so many times larger, smoothly: the renderer takes the nearest pixel.
+_FINER = 8
 #: Where hidden parts wait: behind the camera.
 _AWAY = 1e3
 
@@ -50,6 +51,7 @@ class FilmSet:
         size: width and height in pixels.
         camera: from which side; how far away follows from `points`.
         ground: whether there is a ground at the assembly's table.
+        tops: part name -> uint8 (H, W, 3), pictures that lie on parts' tops, their upper edges towards +y.
 
     Raises:
         InputError: a size below 16 pixels.
@@ -64,13 +66,14 @@ class FilmSet:
         size: tuple[int, int] = (640, 480),
         camera: Camera = DEFAULT_CAMERA,
         ground: bool = True,
+        tops: Mapping[str, Picture] | None = None,
     ) -> None:
         if min(size) < 16:
             raise InputError(f"Expected pictures of at least 16 x 16 pixels; got {size[0]} x {size[1]}.")
         self.size = size
         self._middle = (points.min(axis=0) + points.max(axis=0)) / 2
         self._scale = 2 / float(np.ptp(points, axis=0).max())
-        self._view, self._projection, self._planes = _aimed((points - self._middle) * self._scale, camera, size)
+        self._view, self._projection, self._planes = aimed((points - self._middle) * self._scale, camera, size)
         self._ground = (assembly.ground - self._middle[2]) * self._scale
         self._has_ground = ground and assembly.has_table
         self._triangles: dict[str, Array] = {}
@@ -78,6 +81,7 @@ class FilmSet:
         self._p: Any = self._client.p
         try:
             self._numbers = {part.name: self._part(assembly, i, colours) for i, part in enumerate(assembly.parts)}
+            self._tops = {name: self._top(name, picture) for name, picture in (tops or {}).items()}
         except BaseException:
             self.close()
             raise
@@ -94,19 +98,22 @@ class FilmSet:
     ) -> None:
         self.close()
 
-    def picture(self, shown: Collection[str], where: Mapping[str, Array] | None = None) -> Picture:
+    def picture(
+        self, shown: Collection[str], where: Mapping[str, Array] | None = None, *, marked: Collection[str] = ()
+    ) -> Picture:
         """One picture.
 
         Args:
             shown: names of the parts that are to be seen.
             where: part name -> float64 (4, 4), a motion of the world from where the part rests; others rest.
+            marked: names of parts that are set off by a thick line around them.
 
         Returns:
             uint8 (height, width, 3).
         """
         moved = {} if where is None else where
         self._place(shown, moved)
-        return self._shoot(shown, moved)
+        return self._shoot(shown, moved, marked)
 
     def _place(self, shown: Collection[str], moved: Mapping[str, Array]) -> None:
         for name, number in self._numbers.items():
@@ -119,7 +126,8 @@ class FilmSet:
             if name not in shown:
                 position = np.full(3, -_AWAY)
             at = position.tolist()
-            self._p.resetBasePositionAndOrientation(number, at, turn, physicsClientId=self._client.id)
+            for body in (number, *([self._tops[name]] if name in self._tops else [])):
+                self._p.resetBasePositionAndOrientation(body, at, turn, physicsClientId=self._client.id)
 
     def seen_at(
         self, shown: Collection[str], where: Mapping[str, Array] | None = None
@@ -142,20 +150,32 @@ class FilmSet:
                 found[name] = (float(x / OVERSAMPLING), float(y / OVERSAMPLING), radius)
         return found
 
-    def _shoot(self, shown: Collection[str], moved: Mapping[str, Array]) -> Picture:
+    def _shoot(self, shown: Collection[str], moved: Mapping[str, Array], marked: Collection[str]) -> Picture:
         from PIL import Image
 
         colour, distance, owner = self._drawn()
-        colour[owner < 0] = 255.0
+        nobody = owner < 0
+        colour[nobody] = 255
         if self._has_ground:
-            dark = self._shadow(shown, moved)
-            colour[owner < 0] -= (_SHADE * dark[owner < 0])[:, None]
-        lines = _outlines(owner, distance)
-        inked = colour + lines[:, :, None] * _INK_SHARE * (_INK - colour)
-        image = Image.fromarray(np.clip(np.rint(inked), 0, 255).astype(np.uint8))
-        return np.asarray(image.resize(self.size, Image.Resampling.LANCZOS))
+            bright = cast(
+                (self._moved(name, moved) for name in shown), self._projection @ self._view, self._ground, self.size
+            )
+            # Soft as they are, shadows need no finer drawing.
+            large = np.repeat(np.repeat(bright, OVERSAMPLING, axis=0), OVERSAMPLING, axis=1)
+            colour[nobody] = large[nobody][:, None]
+        ink(colour, owner, distance)
+        set_off(colour, owner, [self._numbers[name] for name in marked])
+        return np.asarray(Image.fromarray(colour).reduce(OVERSAMPLING))
 
-    def _drawn(self) -> tuple[Array, Array, NDArray[np.int64]]:
+    def _moved(self, name: str, moved: Mapping[str, Array]) -> Array:
+        """float64 (n, 3, 3): a part's triangles in the scene."""
+        if name not in moved:
+            return self._triangles[name]
+        X = moved[name]
+        shift = (X[:3, :3] @ self._middle + X[:3, 3] - self._middle) * self._scale
+        return np.asarray(self._triangles[name] @ X[:3, :3].T + shift)
+
+    def _drawn(self) -> tuple[Picture, Single, NDArray[np.int32]]:
         """The large picture: colours (height, width, 3), distances and numbers of parts, -1: none, (height, width)."""
         width, height = (n * OVERSAMPLING for n in self.size)
         _, _, rgba, depth, parts = self._p.getCameraImage(
@@ -163,7 +183,7 @@ class FilmSet:
             height,
             self._view.T.ravel().tolist(),
             self._projection.T.ravel().tolist(),
-            lightDirection=(10 * _LIGHT).tolist(),
+            lightDirection=(10 * LIGHT).tolist(),
             lightColor=(1, 1, 1),
             lightDistance=20,
             shadow=0,
@@ -173,13 +193,13 @@ class FilmSet:
             renderer=self._p.ER_TINY_RENDERER,
             physicsClientId=self._client.id,
         )
-        colour = np.array(rgba, dtype=np.float64).reshape(height, width, 4)[:, :, :3]
-        distance = self._distance(np.asarray(depth, dtype=np.float64).reshape(height, width))
-        return colour, distance, np.asarray(parts, dtype=np.int64).reshape(height, width)
-
-    def _distance(self, depth: Array) -> Array:
+        colour = np.array(rgba, dtype=np.uint8).reshape(height, width, 4)[:, :, :3].copy()
         near, far = self._planes
-        return far * near / (far - (far - near) * depth)
+        distance = far * near / (far - (far - near) * np.asarray(depth, dtype=np.float32).reshape(height, width))
+        owner = np.array(parts, dtype=np.int32).reshape(height, width)
+        for name, top in self._tops.items():
+            owner[owner == top] = self._numbers[name]
+        return colour, distance, owner
 
     def _part(self, assembly: Assembly, number: int, colours: Mapping[str, RGB]) -> int:
         p, c = self._p, self._client.id
@@ -192,7 +212,26 @@ class FilmSet:
         visual = self._visual(self._triangles[name], [*colours[name], 1.0])
         return int(p.createMultiBody(0, -1, visual, physicsClientId=c))
 
-    def _visual(self, triangles: Array, rgba: list[float]) -> int:
+    def _top(self, name: str, picture: Picture) -> int:
+        """A sheet that lies on a part's bounds, with a picture on it."""
+        from PIL import Image
+
+        corners = self._triangles[name].reshape(-1, 3)
+        (x, y, z), (right, back, up) = corners.min(axis=0), corners.max(axis=0)
+        z = up + 1e-3 * (up - z)
+        sheet = np.array([(x, y, z), (right, y, z), (right, back, z), (x, back, z)])[[0, 1, 2, 0, 2, 3]]
+        uv = np.array([(0, 0), (1, 0), (1, 1), (0, 1)])[[0, 1, 2, 0, 2, 3]]
+        visual = self._visual(sheet.reshape(-1, 3, 3), [1.0, 1.0, 1.0, 1.0], uvs=uv.tolist())
+        number = int(self._p.createMultiBody(0, -1, visual, physicsClientId=self._client.id))
+        height, width = picture.shape[:2]
+        smooth = Image.fromarray(picture).resize((_FINER * width, _FINER * height), Image.Resampling.LANCZOS)
+        with tempfile.TemporaryDirectory(prefix="neurosym-") as folder:
+            smooth.save(path := Path(folder) / "top.png")
+            texture = self._p.loadTexture(str(path), physicsClientId=self._client.id)
+        self._p.changeVisualShape(number, -1, textureUniqueId=texture, physicsClientId=self._client.id)
+        return number
+
+    def _visual(self, triangles: Array, rgba: list[float], **options: Any) -> int:
         # Corners are not shared between triangles: each face keeps its own normal, and edges stay sharp.
         normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)
@@ -204,66 +243,6 @@ class FilmSet:
                 normals=np.repeat(normals, 3, axis=0).tolist(),
                 rgbaColor=rgba,
                 physicsClientId=self._client.id,
+                **options,
             )
         )
-
-    def _shadow(self, shown: Collection[str], moved: Mapping[str, Array]) -> Array:
-        """float64 (height, width) of the large picture, 0..1: how dark the ground is under what is shown.
-
-        The corners of all triangles are carried along the light to the ground, drawn, and blurred a little.
-        """
-        from PIL import Image, ImageDraw, ImageFilter
-
-        width, height = (n * OVERSAMPLING for n in self.size)
-        canvas = Image.new("L", (width, height), 0)
-        draw = ImageDraw.Draw(canvas)
-        M = self._projection @ self._view
-        for name in shown:
-            corners = self._triangles[name].reshape(-1, 3)
-            if name in moved:
-                X = moved[name]
-                shift = (X[:3, :3] @ self._middle + X[:3, 3] - self._middle) * self._scale
-                corners = corners @ X[:3, :3].T + shift
-            fallen = corners - np.outer(np.maximum(corners[:, 2] - self._ground, 0.0) / _LIGHT[2], _LIGHT)
-            clip = np.c_[fallen, np.ones(len(fallen))] @ M.T
-            flat = clip[:, :2] / clip[:, 3:]
-            x, y = (flat[:, 0] + 1) / 2 * width, (1 - flat[:, 1]) / 2 * height
-            for triangle in np.stack([x, y], axis=1).reshape(-1, 3, 2):
-                draw.polygon([tuple(corner) for corner in triangle.tolist()], fill=255)
-        blurred = canvas.filter(ImageFilter.GaussianBlur(_SOFT * min(width, height)))
-        return np.asarray(blurred, dtype=np.float64) / 255
-
-
-def _aimed(points: Array, camera: Camera, size: tuple[int, int]) -> tuple[Array, Array, tuple[float, float]]:
-    """View and projection matrices, float64 (4, 4), and the near and far planes, so that all points show."""
-    turn = np.array(camera.view_matrix()).reshape(4, 4).T[:3, :3]
-    seen = points @ turn.T
-    tall = np.tan(np.radians(camera.field_of_view) / 2) * (1 - 2 * MARGIN)
-    wide = tall * size[0] / size[1]
-    # Along each axis both sides are to fit: |x - shift| <= wide * (distance - depth), so the nearest pair decides.
-    shift, distance = np.zeros(2), 0.0
-    for axis, slope in ((0, wide), (1, tall)):
-        right, left = (seen[:, axis] + slope * seen[:, 2]).max(), (-seen[:, axis] + slope * seen[:, 2]).max()
-        shift[axis], distance = (right - left) / 2, max(distance, float(right + left) / (2 * slope))
-    V = np.eye(4)
-    V[:3, :3] = turn
-    V[:3, 3] = -shift[0], -shift[1], -distance
-    near, far = 0.05 * distance, 60.0
-    f = 1 / np.tan(np.radians(camera.field_of_view) / 2)
-    a, b = (far + near) / (near - far), 2 * far * near / (near - far)
-    P = np.array([[f * size[1] / size[0], 0, 0, 0], [0, f, 0, 0], [0, 0, a, b], [0, 0, -1, 0]])
-    return V, P, (near, far)
-
-
-def _outlines(owner: NDArray[np.int64], distance: Array) -> Array:
-    """float64 (height, width), 0..1: where one part ends and another begins, and where a surface folds."""
-    lines = np.zeros(owner.shape)
-    for axis in (0, 1):
-        ahead, behind = np.roll(owner, -1, axis), np.roll(owner, 1, axis)
-        lines[(owner != ahead) | (owner != behind)] = 1.0
-        # On a plane seen in perspective 1 / distance is linear in the picture: its second difference shows folds.
-        flat = 1 / distance
-        fold = np.abs(np.roll(flat, -1, axis) - 2 * flat + np.roll(flat, 1, axis)) / flat
-        lines = np.maximum(lines, 0.6 * np.clip((fold - 4e-4) / 8e-4, 0, 1))
-    lines[[0, -1], :] = lines[:, [0, -1]] = 0.0
-    return lines

@@ -49,6 +49,9 @@ class Camera:
         return [float(x) for x in P.T.ravel()]
 
 
+#: Free space around what a film shows, as a share of the picture.
+MARGIN = 0.06
+
 #: The four views of the paper: from the top (+y up in the picture), then three sides, from +x, +y and -x, raised a
 #: little. Together they see all but the bottom and the side towards -y.
 VIEWS: tuple[Camera, ...] = (Camera(-90, 90), Camera(0, 15), Camera(90, 15), Camera(180, 15))
@@ -170,3 +173,30 @@ def draw_look(style: Style, cameras: Sequence[Camera], colours: Array, rng: np.r
         shifted.append(colorsys.hsv_to_rgb((h + style.hue * hue) % 1.0, s, bright))
     x, y, z = (float(10 * x) for x in direction)
     return Look(turned, (x, y, z), ambient, diffuse, specular, shadow, np.array(shifted), noise)
+
+
+def aimed(points: Array, camera: Camera, size: tuple[int, int]) -> tuple[Array, Array, tuple[float, float]]:
+    """View and projection matrices, float64 (4, 4), and the near and far planes, so that all points show.
+
+    Args:
+        points: float64 (n, 3), in the scene.
+        camera: from which side, and how wide it sees; how far away it stands follows.
+        size: width and height in pixels.
+    """
+    turn = np.array(camera.view_matrix()).reshape(4, 4).T[:3, :3]
+    seen = points @ turn.T
+    tall = np.tan(np.radians(camera.field_of_view) / 2) * (1 - 2 * MARGIN)
+    wide = tall * size[0] / size[1]
+    # Along each axis both sides are to fit: |x - shift| <= wide * (distance - depth), so the nearest pair decides.
+    shift, distance = np.zeros(2), 0.0
+    for axis, slope in ((0, wide), (1, tall)):
+        right, left = (seen[:, axis] + slope * seen[:, 2]).max(), (-seen[:, axis] + slope * seen[:, 2]).max()
+        shift[axis], distance = (right - left) / 2, max(distance, float(right + left) / (2 * slope))
+    V = np.eye(4)
+    V[:3, :3] = turn
+    V[:3, 3] = -shift[0], -shift[1], -distance
+    near, far = 0.05 * distance, 60.0
+    f = 1 / np.tan(np.radians(camera.field_of_view) / 2)
+    a, b = (far + near) / (near - far), 2 * far * near / (near - far)
+    P = np.array([[f * size[1] / size[0], 0, 0, 0], [0, f, 0, 0], [0, 0, a, b], [0, 0, -1, 0]])
+    return V, P, (near, far)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import colorsys
 import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -29,6 +30,10 @@ PALETTE: tuple[RGB, ...] = (
     (0.84, 0.37, 0.00),
     (0.80, 0.47, 0.65),
 )
+
+
+#: Colour of parts that never move, RGB in 0..1, in films and windows.
+FIXED: RGB = (0.55, 0.55, 0.53)
 
 
 @dataclass(frozen=True)
@@ -180,10 +185,22 @@ def palette_colour(i: int) -> RGB:
     return float(r), float(g), float(b)
 
 
+def part_colour(i: int, of: int) -> RGB:
+    """The colour of part number `i` of so many, RGB in 0..1: as in pictures while the palette has enough of them.
+
+    Lighter and darker turns of the palette end in white and black; many parts go round the colour circle instead, each
+    a golden angle from the last.
+    """
+    if of <= 3 * len(PALETTE):
+        return palette_colour(i)
+    return colorsys.hsv_to_rgb(0.618034 * i % 1.0, (0.5, 0.62, 0.38)[i % 3], (0.9, 0.74, 0.98)[i % 3])
+
+
 def part_colours(staging: Staging) -> dict[str, RGB]:
-    """A colour for each part of a plan: its own, or the palette's by its place in the assembly."""
-    names = staging.assembly.names
-    return {name: staging.colours.get(name, palette_colour(i)) for i, name in enumerate(names)}
+    """A colour for each part of a plan: its own; grey where it is fixed; or by its place in the assembly."""
+    names, fixed = staging.assembly.names, staging.assembly.fixed
+    found = {name: FIXED if name in fixed else part_colour(i, len(names)) for i, name in enumerate(names)}
+    return found | dict(staging.colours)
 
 
 def _checked(name: str, colour: Sequence[float]) -> RGB:

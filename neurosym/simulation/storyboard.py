@@ -1,0 +1,100 @@
+"""What a film of a plan shows at each step: who is in the picture, from which side, how large, and in which words."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from neurosym.motions import Motion, Staging
+from neurosym.simulation.filming import DEFAULT_CAMERA, TOPS_CAMERA
+from neurosym.simulation.looks import Camera
+
+Array = NDArray[np.float64]
+
+#: So many degrees the camera turns towards the broad side of an assembly that is four times as long as wide.
+_TURN = 20.0
+
+
+def company(staging: Staging, step: int) -> tuple[str, ...]:
+    """Names of the parts that are in place around what moves in step number `step` (from 0).
+
+    A group that leaves together is taken apart later, in the hand: then only what is left of it is there. Backwards, a
+    group is put together in the hand and then arrives; until then its parts are not where they will be.
+    """
+    motion, motions = staging.motions[step], staging.motions
+    mine = set(motion.parts)
+    if not motion.arrives:
+        there = staging.there(step)
+        if mine <= set(there):
+            return there
+        earlier = [m.parts for m in motions[:step] if not m.arrives]
+        first = next((i for i, parts in enumerate(earlier) if mine & set(parts)), None)
+        if first is None:
+            return there
+        left = set(earlier[first]).difference(*earlier[first + 1 :])
+        return tuple(name for name in staging.assembly.names if name in left)
+    later = [set(m.parts) for m in motions[step + 1 :] if m.arrives]
+    group = next((parts for parts in later if mine & parts), None)
+    if group is None:
+        # What will arrive once more, with others, waits in the hand.
+        waiting = set().union(*later) if later else set()
+        return tuple(name for name in staging.there(step) if name not in waiting | mine)
+    coming = {name for m in motions[step:] if m.arrives and set(m.parts) != group for name in m.parts}
+    return tuple(name for name in staging.assembly.names if name in group - coming)
+
+
+def first_part(motion: Motion) -> str:
+    """The part that a step is about: the one that its action is named after, or the first that moves."""
+    return motion.action if motion.action in motion.parts else motion.parts[0]
+
+
+def describe(staging: Staging, step: int) -> str:
+    """'remove L, along +z'; 'remove a with b, along +x'; 'take a off b, along -z'."""
+    from neurosym.geometry.directions import in_words
+
+    motion = staging.motions[step]
+    around, part = set(company(staging, step)), first_part(motion)
+    verb = "place" if motion.arrives else "remove"
+    others = [name for name in motion.parts if name != part]
+    name = part if motion.action in motion.parts else f"{motion.action}: {part}"
+    said = f"{verb} {name}{' with ' + _few(others) if others else ''}"
+    if not motion.arrives and not around >= set(staging.there(step)):
+        said = f"take {name} off {_few(sorted(around - {part}))}"
+    if len(motion.path) > 2:
+        way = f"along a path of {len(motion.path) - 1} moves"
+    else:
+        shift = motion.path[1, :3, 3] * (-1 if motion.arrives else 1)
+        way = f"along {in_words((shift / np.linalg.norm(shift)).tolist())}" if shift.any() else "turning"
+    held = f", {_few(motion.held)} held" if motion.held else ""
+    return f"{said}, {way}{held}"
+
+
+def _few(names: tuple[str, ...] | list[str]) -> str:
+    """Up to four names, or three and how many more."""
+    return ", ".join(names) if len(names) <= 4 else f"{', '.join(names[:3])} and {len(names) - 3} more"
+
+
+def best_camera(staging: Staging) -> Camera:
+    """From the front right, from above; turned towards the broad side of what is long; steeper to read pictures."""
+    if staging.tops:
+        return TOPS_CAMERA
+    x, y, _ = np.maximum(np.ptp(staging.assembly.bounds, axis=0), 1e-9)
+    share = float(np.clip(np.log2(x / y) / 2, -1, 1))
+    # The front is towards -y, at -90 degrees, the right side at 0.
+    turn = -_TURN * share if share > 0 else -2 * _TURN * share
+    return Camera(DEFAULT_CAMERA.azimuth + turn, DEFAULT_CAMERA.elevation, field_of_view=DEFAULT_CAMERA.field_of_view)
+
+
+def room_for(staging: Staging) -> Array:
+    """float64 (n, 3), in the world: bounds of all parts, resting and at places along their paths."""
+    assembly, found = staging.assembly, []
+    corners = {}
+    for number, name in enumerate(assembly.names):
+        bounds = assembly.body_bounds[assembly.owners == number]
+        low, high = bounds[:, 0].min(axis=0), bounds[:, 1].max(axis=0)
+        corners[name] = np.array(np.meshgrid(*zip(low, high))).reshape(3, -1).T
+        found.append(corners[name])
+    for motion in staging.motions:
+        for share in np.linspace(0, 1, 2 * len(motion.path) + 1):
+            found += [corners[name] @ X[:3, :3].T + X[:3, 3] for name, X in motion.where(float(share)).items()]
+    return np.concatenate(found)
