@@ -14,7 +14,7 @@ from learned_priors.encoders import PictureShape, build_encoder
 from learned_priors.glimpses import GlimpseHead
 from learned_priors.sinkhorn import TOLERANCE, log_sinkhorn, scaled_sinkhorn
 from learned_priors.stopping import StoppingNetwork, log_length_of_stops
-from learned_priors.tcn import TemporalDecoder
+from learned_priors.temporal import TemporalDecoder
 from neurosym.errors import CheckpointError
 
 Head = Literal["dense", "tcn", "glimpses"]
