@@ -9,23 +9,30 @@ import re
 import shlex
 import subprocess
 import sys
+import tomllib
 import zlib
+from dataclasses import asdict
+from functools import cache
 from pathlib import Path
 
 import pytest
 import typer.main
 
+from neurosym import registry
 from neurosym.cli import app, main
 from neurosym.exit_codes import EXIT_CODES
+from neurosym.geometry.tolerances import DEFAULT_TOLERANCES
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
 PAGES = sorted(DOCS.rglob("*.md"))
 #: What a page may leave out of an output, and times, which differ.
 GAP, TIME = "...", re.compile(r"\b\d+(?:\.\d+)? m?s\b")
-#: A comment above a block says why it does not run, or with which exit codes its last command may leave.
+#: A comment above a block says why it does not run, with which exit codes its last command may leave, or as which file
+#: the reader saves it.
 BLOCK = re.compile(
-    r"(?:<!-- (?P<what>skip|exit): (?P<said>[^\n]*?) -->\n)?```(?P<kind>python|console|text)\n(?P<body>.*?)```",
+    r"(?:<!-- (?P<what>skip|exit|file): (?P<said>[^\n]*?) -->\n)?"
+    r"```(?P<kind>python|console|text|toml)\n(?P<body>.*?)```",
     re.DOTALL,
 )
 LINK = re.compile(r"\]\(([^)\s]+)\)")
@@ -37,6 +44,18 @@ def blocks(page):
 
 def runnable(page):
     return [block for block in blocks(page) if block["what"] != "skip"]
+
+
+def install(project, folder):
+    """Declare the entry points of a page's project, as an installation of it would."""
+    info = folder / f"{project['name']}-{project['version']}.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {project['name']}\nVersion: {project['version']}\n")
+    lines = []
+    for group, points in project["entry-points"].items():
+        lines += [f"[{group}]", *(f"{name} = {target}" for name, target in points.items())]
+    (info / "entry_points.txt").write_text("\n".join(lines))
+    registry._entry_points.cache_clear()
 
 
 def same_output(shown, printed):
@@ -83,10 +102,18 @@ def test_outputs_are_told_apart(shown, same):
 @pytest.mark.parametrize("page", [p for p in PAGES if runnable(p)], ids=lambda p: str(p.relative_to(DOCS)))
 def test_code_runs(page, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setattr("neurosym.registry._entry_points", cache(registry._entry_points.__wrapped__))
     names = {}
     printed = ""
     for block in runnable(page):
-        if block["kind"] == "text":  # what the block of Python before it prints
+        if block["what"] == "file":
+            Path(block["said"]).write_text(block["body"], encoding="utf-8")
+            monkeypatch.setitem(sys.modules, Path(block["said"]).stem, None)  # forgotten in the end
+            del sys.modules[Path(block["said"]).stem]
+        if block["kind"] == "toml":
+            install(tomllib.loads(block["body"])["project"], tmp_path)
+        elif block["kind"] == "text":  # what the block of Python before it prints
             assert same_output(block["body"], printed), f"printed:\n{printed}"
         elif block["kind"] == "python":
             line = page.read_text(encoding="utf-8")[: block.start("body")].count("\n")
@@ -100,14 +127,16 @@ def test_code_runs(page, tmp_path, monkeypatch, capsys):
 
 
 def test_there_is_code_and_what_does_not_run_says_why():
-    by_kind = dict.fromkeys(("python", "console", "text"), 0)
+    by_kind = dict.fromkeys(("python", "console", "text", "toml"), 0)
     for page in PAGES:
         for block in runnable(page):
             by_kind[block["kind"]] += 1
         for block in blocks(page):
             assert block["what"] != "skip" or len(block["said"]) > 10, page
         # The expression above finds every block there is.
-        assert len(re.findall(r"^```(?:python|console|text)$", page.read_text(), re.MULTILINE)) == len(blocks(page))
+        assert len(re.findall(r"^```(?:python|console|text|toml)$", page.read_text(), re.MULTILINE)) == len(
+            blocks(page)
+        )
     assert by_kind["python"] >= 15
     assert by_kind["console"] >= 10
 
@@ -124,6 +153,11 @@ def test_the_page_on_commands_has_all_of_them_and_all_exit_codes():
     commands = set(typer.main.get_command(app).commands)
     assert set(re.findall(r"^\| `([a-z]+)` \|", said, re.MULTILINE)) == commands
     assert {int(code) for code in re.findall(r"^\| (\d+) \|", said, re.MULTILINE)} == set(EXIT_CODES)
+
+
+def test_the_limits_name_the_tolerances_as_they_are():
+    rows = re.findall(r"^\| `(\w+)` \| ([\d.]+) \|", (DOCS / "limits.md").read_text(), re.MULTILINE)
+    assert {name: float(value) for name, value in rows} == asdict(DEFAULT_TOLERANCES)
 
 
 @pytest.fixture(scope="module")
