@@ -151,6 +151,43 @@ def test_of_a_long_search_the_first_refusals_are_drawn_and_it_says_so():
     assert f"the first {MOST_REFUSALS} of {MOST_REFUSALS + 50} refusals" in " ".join(texts(figure))
 
 
+def names_at(figure):
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    renderer = FigureCanvasAgg(figure).get_renderer()
+    figure.draw_without_rendering()
+    return {t: t.get_window_extent(renderer) for t in figure.axes[0].texts if t.get_text()}
+
+
+@pytest.mark.parametrize("steps", [3, 12, 30])
+def test_names_of_a_search_are_inside_and_not_on_one_another_and_it_says_how_many_are_left_out(steps):
+    plan = tuple(f"take({100 + k})" for k in range(steps))
+    blame = tuple(ns.Refusal(plan[:k], f"take({200 + k})", "no") for k in range(steps))
+    figure = search_figure(ns.PlanResult(ns.Status.SOLVED, plan, steps, steps, 2 * steps, 0.1, blame=blame))
+    names = names_at(figure)
+    refused = {t.get_text() for t in names if same_colour(t.get_color(), REFUSED)}
+    assert refused == {str(200 + k) for k in range(steps)}  # all of them, whole
+    for text, box in names.items():
+        assert box.x0 >= 0, text
+        assert box.x1 <= figure.bbox.x1, text
+        assert not any(box.overlaps(other) for t, other in names.items() if t is not text), text
+    accepted = {t.get_text() for t in names} - refused
+    left_out = steps - len(accepted)
+    assert accepted <= {str(100 + k) for k in range(steps)}
+    assert (left_out == 0) == (steps < 30)
+    assert (f"{left_out} names are left out" in " ".join(texts(figure))) == (left_out > 0)
+
+
+def test_steps_and_kinds_that_are_there_are_named():
+    plan = tuple(f"take({k})" for k in range(42))
+    figure = search_figure(ns.PlanResult(ns.Status.SOLVED, plan, 0, 42, 42, 0.1))
+    ticks = [int(t) for t in figure.axes[0].get_xticks()]
+    assert len(ticks) <= 10
+    assert ticks[0] == 0
+    assert {t.get_text() for t in figure.legends[0].get_texts()} == {"the plan"}
+    assert "0 iterations, 42 expansions" in " ".join(texts(figure))
+
+
 def test_names_lose_what_all_of_them_share():
     blame = (ns.Refusal(("take(a)",), "take(b)", "no"),)
     result = ns.PlanResult(ns.Status.SOLVED, ("take(a)", "take(c)", "take(b)"), 1, 3, 4, 0.1, blame=blame)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from neurosym.planner import PlanResult
+from neurosym.plotting.labels import width_of
 from neurosym.plotting.layers import shortened
 from neurosym.plotting.style import COLOURS, COLUMN, SMALL, TITLE
 
@@ -16,11 +17,13 @@ if TYPE_CHECKING:
 
 #: Refusals that are drawn, the first ones; the title says how many there were.
 MOST_REFUSALS = 300
-#: More rows than this are drawn without names.
-MOST_NAMES = 60
+#: More rows than this are drawn without names; of many steps so many bear a number.
+MOST_NAMES, MOST_TICKS = 60, 10
 
-#: Width of a letter of names (inches).
-_LETTER = 0.05
+#: Size of names (points), and the least number of letters that a cut one has.
+_LETTERS, _LEAST = 6.0, 4
+#: Where branches leave a node, in steps.
+_TRUNK = 0.1
 
 ON_PLAN, LEFT, REFUSED = COLOURS[4], "0.6", COLOURS[3]
 
@@ -56,21 +59,35 @@ def search_figure(result: PlanResult, *, title: str = "search") -> Figure:
     height = min(max(0.13 * rows, 0.5), 7.0) if named else 5.0
     figure = Figure(figsize=(COLUMN, height + 1.05), layout="constrained")
     axis = figure.subplots()
-    room = int((COLUMN - 0.3) / (steps + 0.7) / _LETTER) - 1
-    _draw(axis, root, max(room, 1) if named else 0)
-    axis.set_ylim(rows - 0.4, -0.6)
-    axis.set_xlim(-0.25, steps + 0.45)
-    axis.set_xticks(range(steps + 1))
+    beyond = _beyond(root, steps) if named else 0.1
+    step = (COLUMN - 0.2 - beyond) / (steps + 0.3)
+    left_out = _draw(axis, root, step if named else 0.0)
+    axis.set_ylim(rows - 0.4, -0.8)
+    axis.set_xlim(-0.3, steps + beyond / step)
+    every = max(1, -(-steps // MOST_TICKS))
+    axis.set_xticks(range(0, steps + 1, every))
     axis.tick_params(labelsize=SMALL)
     axis.set_yticks([])
     for side in ("top", "left", "right"):
         axis.spines[side].set_visible(False)
     axis.set_xlabel("steps done", fontsize=TITLE)
-    counts = f"n = {result.attempts} attempts, {result.iterations} iterations, {result.expansions} expansions"
-    cut = f"\nthe first {drawn} of {len(result.blame)} refusals" if drawn < len(result.blame) else ""
-    figure.suptitle(f"{title}: {_ended(result)}\n{counts}{cut}", fontsize=TITLE)
-    _legend(figure, solved=result.solved)
+    cuts = [f"the first {drawn:,} of {len(result.blame):,} refusals"] if drawn < len(result.blame) else []
+    cuts += ["names are left out"] if not named else [f"{left_out} names are left out"] if left_out else []
+    said = [f"{title}: {_ended(result)}", f"n = {_counts(result)}", *(["; ".join(cuts)] if cuts else [])]
+    figure.suptitle("\n".join(said), fontsize=TITLE)
+    _legend(figure, root, solved=result.solved)
     return figure
+
+
+def _counts(result: PlanResult) -> str:
+    counts = {"attempt": result.attempts, "iteration": result.iterations, "expansion": result.expansions}
+    return ", ".join(f"{n:,} {what}{'' if n == 1 else 's'}" for what, n in counts.items())
+
+
+def _beyond(root: _Node, steps: int) -> float:
+    """What names of refusals at the right edge need (inches)."""
+    last = [shortened(name) for node in _all(root) if node.step == steps - 1 for name in node.refused]
+    return 0.15 + max((width_of(name, _LETTERS) for name in last), default=0.0)
 
 
 def _ended(result: PlanResult) -> str:
@@ -142,38 +159,55 @@ def _walk(root: _Node) -> Iterator[tuple[_Node, bool]]:
             waiting += [(child, False) for child in reversed(node.next.values())]
 
 
-def _draw(axis: Axes, root: _Node, room: int) -> None:
-    size = 3.2 if room else 1.8
+def _draw(axis: Axes, root: _Node, step: float) -> int:
+    """All branches; names where a step is `step` inches wide, above 0. Returns how many names found no room."""
+    size, left_out = 3.2 if step else 1.8, 0
     for node in _all(root):
         for name, child in node.next.items():
             kept = child.on_plan
             look = {"color": ON_PLAN if kept else LEFT, "lw": 1.6 if kept else 0.7, "zorder": 3 if kept else 2}
             _branch(axis, node, child.step, child.row, look)
-            _name(axis, child.step, child.row, name, room, ON_PLAN if kept else "0.35")
+            room = (1 - _TRUNK) * step - 0.02
+            said = _fitting(name, room) if step else ""
+            left_out += bool(step and not said)
+            if said:
+                # Clear of what is refused in the row above, if there is room.
+                at = child.step - min(0.06, room - width_of(said, _LETTERS)) / step
+                colour = ON_PLAN if kept else "0.35"
+                axis.text(at, child.row - 0.12, said, fontsize=_LETTERS, color=colour, ha="right", va="bottom")
         for name, row in zip(node.refused, node.refused_rows):
             _branch(axis, node, node.step + 1, row, {"color": REFUSED, "lw": 0.6, "zorder": 1, "ls": ":"})
             axis.plot(node.step + 1, row, "x", color=REFUSED, ms=size, mew=1.0, zorder=4)
-            _name(axis, node.step + 1, row, name, room, REFUSED)
+            if step:
+                at = node.step + 1 + 0.05 / step
+                said = shortened(name)
+                axis.text(at, row, said, fontsize=_LETTERS, color=REFUSED, ha="left", va="center_baseline", zorder=6)
         colour = ON_PLAN if node.on_plan else LEFT
         axis.plot(node.step, node.row, "o", color=colour, ms=size + (0.8 if node.on_plan else 0), zorder=5)
+    return left_out
 
 
 def _branch(axis: Axes, node: _Node, step: int, row: float, look: dict[str, Any]) -> None:
-    axis.plot([node.step, node.step + 0.25, step], [node.row, row, row], solid_joinstyle="round", **look)
+    bend = node.step + _TRUNK
+    axis.plot([node.step, bend, bend, step], [node.row, node.row, row, row], solid_joinstyle="round", **look)
 
 
-def _name(axis: Axes, step: int, row: float, name: str, room: int, colour: str) -> None:
-    if room:
-        axis.text(step - 0.07, row - 0.08, shortened(name, room), fontsize=6, color=colour, ha="right", va="bottom")
+def _fitting(name: str, width: float) -> str:
+    """The name, cut to a width (inches), or nothing where too little of it would be left."""
+    letters = len(name)
+    while letters and width_of(shortened(name, letters), _LETTERS) > width:
+        letters -= 1
+    return shortened(name, letters) if letters >= min(len(name), _LEAST) else ""
 
 
-def _legend(figure: Figure, *, solved: bool) -> None:
+def _legend(figure: Figure, root: _Node, *, solved: bool) -> None:
     from matplotlib.lines import Line2D
 
-    handles = [
-        Line2D([], [], color=LEFT, marker="o", ms=3.2, lw=0.7, label="accepted, left" if solved else "accepted"),
-        Line2D([], [], color=REFUSED, marker="x", ms=3.2, lw=0.6, ls=":", label="refused"),
-    ]
-    if solved:
-        handles.insert(0, Line2D([], [], color=ON_PLAN, marker="o", ms=4, lw=1.6, label="the plan"))
+    said = "accepted, left" if solved else "accepted"
+    left = Line2D([], [], color=LEFT, marker="o", ms=3.2, lw=0.7, label=said)
+    refused = Line2D([], [], color=REFUSED, marker="x", ms=3.2, lw=0.6, ls=":", label="refused")
+    plan = Line2D([], [], color=ON_PLAN, marker="o", ms=4, lw=1.6, label="the plan")
+    nodes = list(_all(root))
+    kinds = [(plan, solved), (left, any(not n.on_plan for n in nodes)), (refused, any(n.refused for n in nodes))]
+    handles = [handle for handle, there in kinds if there]
     figure.legend(handles=handles, loc="outside lower center", ncols=3, fontsize=SMALL, frameon=False)
