@@ -1,11 +1,9 @@
 """A lattice of translations whose lines lie where faces come level, and quarter turns if wanted, searched by A*.
 
-Offsets along each axis of the moving parts are those at which one of their faces comes level with a face of the
-others, so passages without any play have lattice lines in them. Between boxes with common axes those at which a lower
-face comes to lie on an upper one are enough: any free place can be moved down along each axis until something is
-underneath, and the places so moved hang together as the free places did. There a search that ends without a way out
-proves that no translations lead out. For other shapes the levels of the commonest corners stand in, filled up by even
-steps.
+Offsets along each axis of the moving parts are those at which one of their faces comes level with a face of the others
+(`levels`), so passages without any play have lattice lines in them. Between boxes with common axes those are all the
+offsets that matter: there a search that ends without a way out proves that no translations lead out. For other shapes
+it proves nothing.
 
 With turns, parts may also turn by 90° about their axes, through the middle of any of their bodies: a key in its lock.
 That proves nothing.
@@ -20,6 +18,7 @@ from itertools import pairwise, permutations, product
 import numpy as np
 from numpy.typing import NDArray
 
+from neurosym.geometry.levels import commonest, levels_along
 from neurosym.geometry.motions import Motion
 from neurosym.geometry.removal import Removal
 
@@ -27,13 +26,6 @@ Array = NDArray[np.float64]
 
 #: Orientation (a number) and offset along the three axes.
 Node = tuple[int, float, float, float]
-
-#: Levels of corners considered for each side, and offsets along an axis, for parts that are no boxes.
-MAX_LEVELS = 24
-MAX_OFFSETS = 48
-
-#: Even steps along an axis for parts that are no boxes.
-FILL = 24
 
 #: Poses between the ends of a quarter turn, and bodies through whose middles turns are tried.
 TURN_STEPS = 9
@@ -200,7 +192,7 @@ class Lattice:
         bounds = self.removal.assembly.body_bounds[self.removal.own_bodies]
         largest = np.argsort(-np.ptp(bounds, axis=1).max(axis=1), kind="stable")[:MAX_PIVOTS]
         local = self._own @ self._frame
-        spans = [_commonest(axis, self.removal.assembly.touch)[:2].mean() for axis in local.T]
+        spans = [commonest(axis, self.removal.assembly.touch)[:2].mean() for axis in local.T]
         between = np.array(list(product(*((0.0, span) for span in spans)))) @ self._frame.T + self.removal.centre
         points = np.concatenate([self.removal.centre[None], bounds[largest].mean(axis=1), between])
         _, first = np.unique(np.round(points, self._digits), axis=0, return_index=True)
@@ -211,56 +203,10 @@ class Lattice:
         """Offsets along the three axes, in order; 0 and one beyond each end are among them."""
         known = self._offsets.get(orientation)
         if known is None:
-            known = self._offsets[orientation] = [self._along(orientation, axis) for axis in range(3)]
+            known = self._offsets[orientation] = [
+                levels_along(self.removal, axis, self._rotations[orientation], self._digits) for axis in self._frame.T
+            ]
         return known
-
-    def _along(self, orientation: int, axis: int) -> list[float]:
-        removal, assembly = self.removal, self.removal.assembly
-        direction = self._frame[:, axis]
-        # Offsets are the centre's: turning back the direction is cheaper than turning the parts.
-        towards = self._rotations[orientation].T @ direction
-        base = float(removal.centre @ (direction - towards))
-        own = [assembly.body_vertices(i) @ towards + base for i in removal.own_bodies]
-        others = [assembly.body_vertices(i) @ direction for i in removal.other_bodies]
-        low, high = min(o.min() for o in own), max(o.max() for o in own)
-        ends = min(o.min() for o in others), max(o.max() for o in others)
-        room = 0.25 * assembly.smallest_extent
-        start, end = float(ends[0] - high - room), float(ends[1] - low + room)
-        must = [0.0, start, end]
-        if removal.ground is not None and abs(direction[2]) > 1 - 1e-9:
-            lowest = low if direction[2] > 0 else high
-            must.append(removal.ground * float(np.sign(direction[2])) - float(lowest))
-        if removal.aligned:
-            lower, upper = np.unique([o.min() for o in own]), np.unique([o.max() for o in others])
-            found = _merged((upper[:, None] - lower).ravel(), must, start, end, assembly.touch, None)
-        else:
-            common = [_commonest(np.concatenate(points), assembly.touch) for points in (own, others)]
-            must.extend(np.linspace(start, end, FILL).tolist())
-            between = (common[1][:, None] - common[0]).ravel()
-            found = _merged(between, must, start, end, assembly.touch, MAX_OFFSETS)
-        return sorted({round(float(v), self._digits) + 0.0 for v in found})
-
-
-def _merged(levels: Array, must: list[float], start: float, end: float, touch: float, limit: int | None) -> Array:
-    """Levels within the range, those nearer than `touch` to another merged, the commonest kept; `must` are all kept."""
-    found = sorted(must)
-    levels = np.sort(levels[(levels > start) & (levels < end)])
-    if len(levels):
-        groups = np.split(levels, np.flatnonzero(np.diff(levels) > touch) + 1)
-        if limit is not None:
-            groups = sorted(groups, key=len, reverse=True)[:limit]
-        # The middle of a group of levels that differ by rounding, or by overlaps that are no more than touch.
-        middles = np.array([g.mean() for g in groups])
-        found.extend(m for m in middles if np.abs(np.array(must) - m).min() > touch)
-    return np.unique(found)
-
-
-def _commonest(levels: Array, touch: float) -> Array:
-    """The levels that most corners lie on."""
-    levels = np.sort(levels)
-    groups = np.split(levels, np.flatnonzero(np.diff(levels) > touch) + 1)
-    chosen = sorted(groups, key=len, reverse=True)[:MAX_LEVELS]
-    return np.array([g.mean() for g in chosen])
 
 
 def _quarter_turns() -> list[Array]:
