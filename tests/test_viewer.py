@@ -23,11 +23,14 @@ from neurosym.cli import main
 from neurosym.geometry.meshes import signed_volume
 from neurosym.motions import Motion, Staging, stage, steps_in_space
 from neurosym.viewer import panels, score_table
+from neurosym.viewer.export import PAUSE, SECONDS_PER_STEP, _with_panel
 from neurosym.viewer.facts import part_facts
+from neurosym.viewer.follow import follower
 from neurosym.viewer.planning import Planning, problem_maker
 from neurosym.viewer.shown import Query, Search, Shown
 from neurosym.viewer.solids import solids
 from neurosym.viewer.sources import open_source
+from neurosym.viewer.steps import AFTER, BEFORE, caption, steps
 from neurosym.viewer.timeline import ABSENT, APART, IN_PLACE, ON_PATH, Timeline
 
 UP = (0.0, 0.0, 1.0)
@@ -363,8 +366,8 @@ def test_panels_escape_what_names_hold(shown):
     nasty = replace(shown, search=search, timeline=None, notes=(evil,))
     texts = [
         panels.overview(nasty),
-        panels.steps(nasty, 0),
-        panels.caption(nasty, 0.0),
+        steps(nasty, 0),
+        caption(nasty, 0.0),
         panels.refusals(search),
         score_table.scores_table(scores, [evil], [evil]),
         panels.facts(part_facts(world, "b", world.names)),
@@ -374,6 +377,71 @@ def test_panels_escape_what_names_hold(shown):
     for text in texts:
         assert "<img src=x" not in text
     assert sum("&lt;img" in text for text in texts) == len(texts) - 1  # a caption without a film names the problem
+    assert follower(["</script>"] * 3, 1.0, 1.5).count("</script>") == 1
+
+
+def staged(shown, motions, **change):
+    """`shown` with the steps of a plan of other motions, each in a search that found it."""
+    film = Timeline(Staging(shown.timeline.staging.assembly, shown.timeline.names, tuple(motions)))
+    search = replace(shown.search, steps=tuple(m.action for m in motions), refusals=())
+    return replace(shown, timeline=film, search=replace(search, **change))
+
+
+def test_ways_that_were_looked_for_are_remarked_on_once(shown):
+    motions = shown.timeline.staging.motions
+    given = steps(shown, None)
+    assert "looked for" not in given
+    without = staged(shown, [replace(m, given=False) for m in motions])
+    assert steps(without, None).count("looked for") == 1
+    assert "looked for" not in caption(without, 0.5)
+    mixed = steps(staged(shown, [replace(m, given=i != 2) for i, m in enumerate(motions)]), None)
+    assert mixed.count("looked for") == 1
+    rows = [row for row in mixed.split("<li")[1:] if "data-step" in row]
+    assert [" *</li>" in row for row in rows] == [i == 2 for i in range(len(motions))]
+
+
+def test_what_goes_together_is_held_or_makes_way_is_said(shown):
+    first = shown.timeline.staging.motions[0]
+    a, b, c, d = [n for n in shown.timeline.names if n != first.action][:4]
+    aside = ((c,), first.path, first.centre)
+    group = replace(first, parts=(first.action, a, b), aside=(aside,), held=(d,))
+    one = staged(shown, [group])
+    said = caption(one, 0.5)
+    assert f"<b>{first.action}, {a}, {b}</b> together leave " in said
+    assert f"{c} making way" in said
+    assert f">{d}</span> is held" in said
+    assert f"together with {a}, {b}, {c} making way, while {d} is held" in steps(one, 0)
+    other = caption(staged(shown, [replace(group, parts=(a, b))]), 0.5)
+    assert f"<b>{first.action}</b>: <b>{a}, {b}</b> together leave" in other
+    assert "together" not in caption(shown, 0.5)
+
+
+def test_a_long_list_keeps_the_step_under_way_in_sight(shown):
+    first = shown.timeline.staging.motions[0]
+    long = staged(shown, [first] * 100)
+    assert steps(long, None).count("<li") == 100
+    assert steps(long, 50, all_of_them=True).count("<li") == 100
+    for now in (0, 3, 50, 97, 99):
+        text = steps(long, now)
+        numbers = [int(piece.split("'")[0]) for piece in text.split("data-step='")[1:]]
+        assert len(numbers) == BEFORE + AFTER + 1
+        assert numbers == list(range(numbers[0], numbers[-1] + 1))
+        assert now in numbers
+        assert f"<ol start='{numbers[0] + 1}'>" in text
+        assert text.count("aria-current") == 1
+        assert f"aria-current='step' data-step='{now}'" in text
+
+
+def test_where_there_is_no_plan_the_panel_says_why(shown):
+    never = {"status": ns.Status.UNSOLVABLE, "why_not": ("a blocks b", "b blocks a")}
+    stuck = staged(shown, [], **never)
+    assert "not even a first step works" in steps(stuck, None)
+    assert steps(stuck, None).count("blocks") == 2
+    assert "no plan" in caption(stuck, 0.0)
+    some = staged(shown, shown.timeline.staging.motions[:2], refusals=shown.search.refusals[:1], **never)
+    assert "the longest prefix that works is shown" in steps(some, None)
+    assert "tab Search" in steps(some, None)
+    assert "no plan" not in caption(shown, 0.0)
 
 
 def test_attempts_come_in_order_with_the_plan_between():
@@ -595,10 +663,10 @@ def test_an_assembly_is_planned_as_plan_plans_it(tmp_path, capsys):
     assert call("view", tmp_path / "box.json", "--directions", "+z", "--no-gravity", "--export", page) == 0
     text = page.read_text()
     assert "backtracking with the prior outermost-first" in text
-    assert text.index("<li>high") < text.index("<li>low")
+    assert text.index(">high <") < text.index(">low <")
     # Nothing goes down through the table.
     assert call("view", tmp_path / "box.json", "--directions=-z", "--export", page) == 11
-    assert "the longest prefix that works is shown" in page.read_text()
+    assert "not even a first step works" in page.read_text()
     assert "Nothing can be taken out" in page.read_text()
 
 
@@ -642,7 +710,7 @@ def test_without_viser_the_extra_is_named(monkeypatch, capsys):
 
 
 def test_the_model_loads_no_viser():
-    pure = ("timeline", "facts", "solids", "panels", "score_table", "planning", "sources")
+    pure = ("timeline", "facts", "solids", "panels", "steps", "follow", "score_table", "look", "planning", "sources")
     names = ", ".join(f"neurosym.viewer.{name}" for name in pure)
     code = f"import sys, neurosym.cli, {names}; assert 'viser' not in sys.modules"
     subprocess.run([sys.executable, "-c", code], check=True)
@@ -885,10 +953,45 @@ def test_the_exported_page_plays_without_server_and_network(browser, plan_file, 
     first = float(clock.input_value())
     until(lambda: float(clock.input_value()) > first)
     tab.locator("#said").get_by_text("A plan was found.").wait_for()
+    plan = json.loads(plan_file.read_text())["plan"]
+    now = tab.locator("#steps li[aria-current]")
+    for step in (4, 1):
+        tab.locator(f"#steps li[data-step='{step}']").click()
+        start = f"{PAUSE + step * SECONDS_PER_STEP:.1f}"
+        until(lambda start=start: clock.input_value() == start)
+        until(lambda step=step: now.count() == 1 and now.get_attribute("data-step") == str(step))
+        assert tab.locator("#now").inner_text().startswith(f"Step {step + 1} of 7: {plan[step]} leaves")
+    # Somebody moves the player's clock, or the film goes on: the list follows.
+    clock.fill(f"{PAUSE + 6.5 * SECONDS_PER_STEP:.1f}")
+    until(lambda: now.count() == 1 and now.inner_text().startswith(plan[6]))
+    clock.fill("0.2")
+    until(lambda: now.count() == 0)
+    assert "before the first" in tab.locator("#now").inner_text()
     assert tab.title() == "soma-17"
     assert errors == []
     assert all(url.startswith(("file:", "data:", "blob:")) for url in asked), asked
     context.close()
+
+
+@pytest.mark.parametrize("player", ["<p>something else</p>", "<input value='soon'>", "<input value=''>"])
+def test_the_list_stays_a_list_where_the_player_is_another(browser, shown, player, tmp_path):
+    page = tmp_path / "page.html"
+    page.write_text(_with_panel(f"<html><body><div id='root'>{player}</div></body></html>", shown))
+    tab = browser.new_page()
+    errors = []
+    tab.on("pageerror", lambda e: errors.append(str(e)))
+    tab.goto(page.as_uri())
+    tab.locator("#steps li").nth(3).click()
+    tab.wait_for_timeout(300)
+    assert tab.locator("#steps li[aria-current]").count() == 0
+    assert not tab.locator(".hint").is_visible()
+    assert errors == []
+    # The same page follows a field that tells seconds.
+    tab.locator("#root").evaluate(f"(root) => {{ root.innerHTML = '<input value={PAUSE + 2.5 * SECONDS_PER_STEP}>' }}")
+    tab.locator("#steps li[aria-current]").wait_for()
+    assert tab.locator("#steps li[aria-current]").get_attribute("data-step") == "2"
+    assert tab.locator(".hint").is_visible()
+    tab.close()
 
 
 def test_an_export_that_fails_leaves_nothing(shown, tmp_path):

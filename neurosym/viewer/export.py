@@ -10,10 +10,12 @@ import numpy as np
 from neurosym.errors import InputError
 from neurosym.files import write_text
 from neurosym.viewer import panels
+from neurosym.viewer.follow import follower
 from neurosym.viewer.scene import PlanScene
 from neurosym.viewer.score_table import scores_table
 from neurosym.viewer.server import LocalServer
 from neurosym.viewer.shown import Shown
+from neurosym.viewer.steps import caption, steps
 
 #: Scene updates a second of the recording, and seconds that a step takes.
 RATE, SECONDS_PER_STEP = 15, 1.5
@@ -67,9 +69,11 @@ def _film(shown: Shown) -> str:
 
 def _with_panel(film: str, shown: Shown) -> str:
     """The player with what the panel of the page says beside it."""
-    search = shown.search
+    search, total = shown.search, len(shown.search.steps)
     said = (
-        f"{panels.overview(shown)}{panels.steps(shown, None)}"
+        f"<div id='now'>{caption(shown, 0.0)}</div>{panels.overview(shown)}"
+        f"<div id='steps'>{steps(shown, None)}</div>"
+        f"<p class='quiet hint'>A click on a step goes there and waits; the player's button plays on.</p>"
         f"<h3>Prior</h3>{scores_table(search.scores, shown.problem.actions, search.steps)}"
         f"<h3>Reference</h3>{panels.pictures(shown.pictures)}"
         f"<h3>Attempts, in order</h3>{panels.refusals(search)}"
@@ -77,11 +81,16 @@ def _with_panel(film: str, shown: Shown) -> str:
     style = (
         f"<style>body{{margin:0}}#root{{position:fixed!important;inset:0 {PANEL}px 0 0!important;width:auto!important}}"
         f"#said{{position:fixed;top:0;right:0;bottom:0;width:{PANEL}px;box-sizing:border-box;overflow:auto;"
-        "padding:10px 4px;border-left:1px solid #ddd;background:#fff;color:#111;font-family:sans-serif}"
-        "#said h3{font-size:14px;margin:14px 0 4px}</style>"
+        "padding:0 4px 10px;border-left:1px solid #ddd;background:#fff;color:#111;font-family:sans-serif}"
+        "#said h3{font-size:14px;margin:14px 0 4px}#now{position:sticky;top:0;background:#fff;z-index:1;"
+        "border-bottom:1px solid #ddd}#steps{max-height:45vh;overflow:auto}#steps.live li[data-step]{cursor:pointer}"
+        "#steps.live li[data-step]:hover{background:#eef5fa}#steps.live li.now:hover{background:#ffe9c9}"
+        ".hint{display:none}#steps.live+.hint{display:block}</style>"
     )
+    times = (0.0, *(i + 0.5 for i in range(total)), float(total))
+    script = follower([caption(shown, t) for t in times], PAUSE, SECONDS_PER_STEP) if total else ""
     title = f"<title>{escape(shown.problem.name)}</title>"
-    aside = f"{style}<aside id='said'>{panels.styled(said)}</aside>"
+    aside = f"{style}<aside id='said'>{panels.styled(said)}</aside>{script}"
     head, body = "<title>Viser</title>", "</body>"
     page = film.replace(head, title, 1) if head in film else film
     before, found, after = page.rpartition(body)

@@ -18,6 +18,7 @@ from neurosym.viewer.scene import PlanScene, named_at_first
 from neurosym.viewer.score_table import scores_table
 from neurosym.viewer.server import LocalServer
 from neurosym.viewer.shown import REFUSED, Maker, Query, Shown
+from neurosym.viewer.steps import caption, steps
 
 #: Scene updates a second while the film plays, and seconds that a step takes at speed 1.
 RATE, SECONDS_PER_STEP = 30.0, 1.5
@@ -158,8 +159,8 @@ class Page:
             key = (now, int(t))
             if key != self._step_shown:
                 self._step_shown = key
-                self.plan_tab.content = panels.styled(panels.overview(shown) + panels.steps(shown, now))
-                self.caption.content = panels.styled(panels.caption(shown, t))
+                self.plan_tab.content = panels.styled(panels.overview(shown) + steps(shown, now))
+                self.caption.content = panels.styled(caption(shown, t))
                 self._tell_facts()
 
     def _toggle(self) -> None:

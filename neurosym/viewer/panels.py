@@ -1,4 +1,4 @@
-"""What stands beside the 3D view, as HTML: plan, prior, search, pictures, facts about a part. Every name is escaped."""
+"""What stands beside the 3D view, as HTML: the search, pictures, facts about a part. Every name is escaped."""
 
 from __future__ import annotations
 
@@ -12,11 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from neurosym.geometry.directions import in_words
 from neurosym.viewer.facts import PartFacts
 
 if TYPE_CHECKING:
-    from neurosym.motions import Motion
     from neurosym.planner import Refusal
     from neurosym.viewer.planning import Progress
     from neurosym.viewer.shown import Search, Shown
@@ -31,8 +29,6 @@ WIDTH = 360
 REFUSED, BECAUSE = (213, 94, 0), (0, 114, 178)
 
 
-
-
 def overview(shown: Shown) -> str:
     """How the search ended, its figures, and notes on what is missing."""
     search = shown.search
@@ -45,23 +41,6 @@ def overview(shown: Shown) -> str:
     )
 
 
-def caption(shown: Shown, t: float) -> str:
-    """Where the film is at time t, in a line."""
-    timeline, total = shown.timeline, len(shown.search.steps)
-    now = timeline.step_at(t) if timeline else None
-    if timeline is None or not total:
-        text = escape(shown.problem.name)
-    elif now is not None:
-        motion = timeline.staging.motions[now]
-        verb = "comes" if motion.arrives else "leaves"
-        text = f"Step {now + 1} of {total}: <b>{escape(shown.search.steps[now])}</b> {verb} {escape(in_short(motion))}"
-    elif t <= 0:
-        text = f"<b>{escape(shown.problem.name)}</b>: before the first of {total} steps"
-    else:
-        text = f"After step {int(t)} of {total}"
-    return f"<div style='min-height:2.7em;padding-top:4px'>{text}</div>"
-
-
 def progress(now: Progress, *, stopping: bool) -> str:
     """How far a search is."""
     head = "Stopping after the attempt that is under way …" if stopping else f"{now.phase.capitalize()} …"
@@ -70,40 +49,7 @@ def progress(now: Progress, *, stopping: bool) -> str:
     return f"<p><b>{escape(head)}</b><br><span class='quiet'>{figures}, {now.seconds:.1f} s</span></p>"
 
 
-def steps(shown: Shown, now: int | None) -> str:
-    """The steps, numbered from 1; the one under way, number `now` from 0, stands out."""
-    motions = shown.timeline.staging.motions if shown.timeline else ()
-    rows = []
-    for i, action in enumerate(shown.search.steps):
-        how = f" <span class='quiet'>{escape(in_short(motions[i]))}</span>" if motions else ""
-        rows.append(f"<li{_MARKED if i == now else ''}>{escape(action)}{how}</li>")
-    what = "" if shown.search.solved else "<p class='note'>No plan: the longest prefix that works is shown.</p>"
-    what += "".join(f"<p>{escape(sentence)}</p>" for sentence in shown.search.why_not)
-    return f"{what}<ol>{''.join(rows)}</ol>" if rows else f"{what}<p>There is no step to show.</p>"
-
-
-_MARKED = " style='background:#ffe9c9;font-weight:bold'"
-
-
-def in_short(motion: Motion) -> str:
-    """How the parts of a step move, in a few words."""
-    if len(motion.path) > 2:
-        way = f"along a path of {len(motion.path)} poses"
-    else:
-        shift = motion.path[-1, :3, 3] - motion.path[0, :3, 3]
-        shift = -shift if motion.arrives else shift
-        way = f"along {in_words((shift / max(float(np.linalg.norm(shift)), 1e-300)).tolist())}"
-    others = [n for n in motion.parts if n != motion.action]
-    said = f"{way}, with {_some(others)}" if others and motion.action in motion.parts else way
-    if any(set(names) - set(motion.parts) for names, *_ in motion.aside):
-        making_way = [n for names, *_ in motion.aside for n in names if n not in motion.parts]
-        said = f"{said}, {_some(making_way)} making way"
-    if motion.held:
-        said = f"{said}, while {_some(motion.held)} {'is' if len(motion.held) == 1 else 'are'} held"
-    return said if motion.given else f"{said} (the plan does not say how: a way looked for here)"
-
-
-def _some(names: Sequence[str]) -> str:
+def some(names: Sequence[str]) -> str:
     """Names with commas; the many by their first and their number."""
     return ", ".join(names[:12]) + (f" and {len(names) - 12} more" if len(names) > 12 else "")
 
@@ -185,7 +131,7 @@ def facts(found: PartFacts) -> str:
 
 
 def _names(names: Sequence[str], also: str = "") -> str:
-    found = escape(", ".join(filter(None, [_some(names), also])))
+    found = escape(", ".join(filter(None, [some(names), also])))
     return found or "<span class='quiet'>nothing</span>"
 
 
@@ -212,8 +158,10 @@ def styled(content: str) -> str:
 
 
 _STYLE = (
-    "<style>.ns .quiet{color:#767676}.ns .note{color:#8a4b00}.ns ol{margin:4px 0;padding-left:26px}"
-    ".ns li{padding:1px 4px;border-radius:3px}.ns p{margin:4px 0}.ns td{padding:1px 0}</style>"
+    "<style>.ns .quiet{color:#6b6b6b}.ns .note{color:#8a4b00}.ns ol{margin:4px 0;padding-left:34px}"
+    ".ns li{padding:1px 4px;border-radius:3px}.ns p{margin:4px 0}"
+    ".ns ul{margin:4px 0;padding-left:18px}.ns td{padding:1px 0}"
+    ".ns .now{background:#ffe9c9;color:#222;font-weight:bold}</style>"
 )
 
 

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import colorsys
-import itertools
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
 import numpy as np
 import viser
 from numpy.typing import NDArray
 
-from neurosym.simulation.scene import PALETTE, palette_colour
+from neurosym.viewer.look import FIELD_OF_VIEW, FIXED, camera_for, light, part_colour
 from neurosym.viewer.solids import Solid, solids
+from neurosym.viewer.steps import HELD
 from neurosym.viewer.timeline import Timeline, floor_of
 
 Array = NDArray[np.float64]
@@ -27,15 +26,11 @@ MOST_NAMES = 12
 #: How opaque parts are while another one is selected.
 FAINT = 0.22
 
-#: The camera's field of view (radians, top to bottom), where it looks from (the front, a little from the right, from
-#: above), and how much more than all that is ever seen it takes in.
-FIELD_OF_VIEW, FROM, MARGIN = 0.7, np.array([0.35, -0.75, 0.56]), 1.05
+#: How many times as thick as others the outline of a part is that is held.
+HELD_BY = 3.0
 
 #: Turns a picture, which faces along -z with its top at -y, so that it lies face up with its top at +y.
 _UPWARD = (0.0, 1.0, 0.0, 0.0)
-
-#: Colour of parts that never move, RGB in 0..1.
-FIXED = (0.55, 0.55, 0.53)
 
 _EDGE, _PICKED = (45, 45, 45), (213, 94, 0)
 
@@ -43,17 +38,6 @@ _EDGE, _PICKED = (45, 45, 45), (213, 94, 0)
 def named_at_first(timeline: Timeline | None) -> bool:
     """Whether parts bear their names before anybody asks: where they are few, and no picture says what they are."""
     return timeline is not None and len(timeline.names) <= MOST_NAMES and not timeline.staging.tops
-
-
-def part_colour(number: int, of: int) -> tuple[float, float, float]:
-    """The colour of a part without one of its own, RGB in 0..1: as in pictures while the palette has enough of them.
-
-    Lighter and darker turns of the palette end in white and black; many parts go round the colour circle instead, each
-    a golden angle from the last.
-    """
-    if of <= 3 * len(PALETTE):
-        return palette_colour(number)
-    return colorsys.hsv_to_rgb(0.618034 * number % 1.0, (0.5, 0.62, 0.38)[number % 3], (0.9, 0.74, 0.98)[number % 3])
 
 
 class PlanScene:
@@ -74,15 +58,17 @@ class PlanScene:
         self._way: viser.LineSegmentsHandle | None = None
         self._way_of: int | None = None
         self._standing_out: Mapping[str, RGB | None] | None = None
+        self._held: frozenset[str] = frozenset()
         self._colours: list[RGB] = []
         server.scene.set_up_direction("+z")
-        server.scene.configure_default_lights(enabled=True, cast_shadow=True)
+        light(server.scene)
 
     def put(self, timeline: Timeline | None) -> None:
         """Show another timeline from its beginning, or nothing."""
         with self.server.atomic():
             self.server.scene.remove_by_name("/parts")
             self.timeline, self._standing_out, self._way, self._way_of = timeline, None, None, None
+            self._held = frozenset()
             self.parts, self._names, self._outlines, self._colours = [], [], {}, []
             if timeline is not None:
                 self._add(timeline)
@@ -94,13 +80,13 @@ class PlanScene:
         self._sent = np.full((len(assembly), 8), np.nan)
         self.scale = SIZE / float((high - low).max())
         self.origin = np.array([*(low[:2] + high[:2]) / 2, floor_of(assembly)])
-        thick = 0.0035 * SIZE * min(1.0, 6.0 / len(assembly) ** 0.5)
+        self._thick = 0.0035 * SIZE * min(1.0, 6.0 / len(assembly) ** 0.5)
         for i, solid in enumerate(solids(assembly)):
-            self._add_part(timeline, i, solid, thick)
+            self._add_part(timeline, i, solid)
         self._ground(timeline)
         self._look(timeline)
 
-    def _add_part(self, timeline: Timeline, i: int, solid: Solid, thick: float) -> None:
+    def _add_part(self, timeline: Timeline, i: int, solid: Solid) -> None:
         """A part's mesh, and under it in the tree its outline, its picture and its name."""
         assembly, scene = timeline.staging.assembly, self.server.scene
         name, middle = assembly.names[i], timeline.centres[i]
@@ -110,7 +96,7 @@ class PlanScene:
         vertices, outline = (solid.vertices - middle) * self.scale, (solid.outline - middle) * self.scale
         node = scene.add_mesh_simple(f"/parts/{i}", vertices, solid.faces, color=(r, g, b), flat_shading=True)
         if len(outline):
-            self._outlines[name] = scene.add_line_segments(f"/parts/{i}/edges", outline, _EDGE, thickness=thick)
+            self._outlines[name] = scene.add_line_segments(f"/parts/{i}/edges", outline, _EDGE, thickness=self._thick)
         if name in timeline.staging.tops:
             x, y, z = np.ptp(timeline.bounds_at_rest[i], axis=0) * self.scale
             top = timeline.staging.tops[name]
@@ -149,14 +135,7 @@ class PlanScene:
     def _look(self, timeline: Timeline) -> None:
         """Place the cameras as near as they can be and still see all of the film in a square window."""
         low, high = self._to_scene(timeline.bounds())
-        middle, back = (low + high) / 2, FROM / np.linalg.norm(FROM)
-        right = np.cross([0.0, 0.0, 1.0], back)
-        right /= np.linalg.norm(right)
-        corners = (np.array(list(itertools.product(*zip(low, high)))) - middle) @ np.stack(
-            [right, np.cross(back, right), back], axis=1
-        )
-        away = corners[:, 2] + np.abs(corners[:, :2]).max(axis=1) * MARGIN / np.tan(FIELD_OF_VIEW / 2)
-        eye = middle + float(away.max()) * back
+        eye, middle = camera_for(low, high)
         camera = self.server.initial_camera
         camera.position, camera.look_at, camera.up = tuple(eye), tuple(middle), (0.0, 0.0, 1.0)
         camera.fov = FIELD_OF_VIEW
@@ -187,11 +166,12 @@ class PlanScene:
         self._sent = now
 
     def _show_way(self, timeline: Timeline, t: float) -> None:
-        """The way of the step under way as a line; the parts' middle follows it."""
+        """The way of the step under way as a line, which the parts' middle follows; and what is held meanwhile."""
         step = timeline.step_at(t)
         if step == self._way_of:
             return
         self._way_of = step
+        self._hold(() if step is None else timeline.staging.motions[step].held)
         if self._way is not None:
             self._way.remove()
             self._way = None
@@ -199,6 +179,14 @@ class PlanScene:
             way = self._to_scene(timeline.path_of(step))
             pieces = np.stack([way[:-1], way[1:]], axis=1)
             self._way = self.server.scene.add_line_segments("/parts/way", pieces, _PICKED, thickness=0.008 * SIZE)
+
+    def _hold(self, names: Collection[str]) -> None:
+        """Outline what is held, boldly and in its colour; what was held before is as it was."""
+        for name in self._held.symmetric_difference(names).intersection(self._outlines):
+            outline, held = self._outlines[name], name in names
+            outline.colors = np.full_like(outline.colors, HELD if held else _EDGE)
+            outline.thickness = HELD_BY * self._thick if held else self._thick
+        self._held = frozenset(names)
 
     def stand_out(self, colours: Mapping[str, RGB | None] | None) -> None:
         """Let parts stand out, each in a colour (0..255) or, with None, its own, the others faint; None ends it."""

@@ -1,0 +1,142 @@
+"""The steps of a plan as HTML: where the film is, in a line, and the list beside it. Every name is escaped."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from neurosym.geometry.directions import in_words
+from neurosym.viewer.panels import some
+
+if TYPE_CHECKING:
+    from neurosym.motions import Motion
+    from neurosym.viewer.shown import Shown
+
+#: While a step of a longer list is under way, so many before it and after it are listed, to keep it in sight.
+BEFORE, AFTER = 6, 20
+
+#: Colour (0..255) of what is held while a step is done: its outline in the view, its name in the caption.
+HELD = (170, 0, 120)
+
+_HELD = f"color:#{''.join(f'{c:02x}' for c in HELD)};font-weight:bold"
+
+
+def caption(shown: Shown, t: float) -> str:
+    """Where the film is at time t, in a line."""
+    timeline, total = shown.timeline, len(shown.search.steps)
+    now = timeline.step_at(t) if timeline else None
+    name = f"<b>{escape(shown.problem.name)}</b>"
+    if timeline is None or not total:
+        text = name if shown.search.solved else f"{name}: no plan. The tab Plan says why, as far as it is known."
+    elif now is not None:
+        motion = timeline.staging.motions[now]
+        said = f"{_who(motion)} {_verb(motion)} {escape(_way(motion))}"
+        text = f"Step {now + 1} of {total}: {said}{_meanwhile(motion)}"
+    elif t <= 0:
+        text = f"{name}: before the first of {total} steps"
+    else:
+        text = f"After step {int(t)} of {total}"
+    return f"<div style='min-height:2.7em;padding-top:4px'>{text}</div>"
+
+
+def steps(shown: Shown, now: int | None, *, all_of_them: bool = False) -> str:
+    """The steps, numbered from 1; the one under way, number `now` from 0, stands out.
+
+    Args:
+        shown: what is shown.
+        now: the step under way, or None.
+        all_of_them: whether even a long list is whole while a step of it is under way.
+    """
+    motions = shown.timeline.staging.motions if shown.timeline else ()
+    total = len(shown.search.steps)
+    first, end = (0, total) if now is None or all_of_them else _in_sight(now, total)
+    looked_for = [i for i, motion in enumerate(motions) if not motion.given]
+    mixed = 0 < len(looked_for) < len(motions)
+    rows = []
+    for i in range(first, end):
+        how = f" <span class='quiet'>{escape(in_short(motions[i]))}</span>" if motions else ""
+        star = " *" if mixed and not motions[i].given else ""
+        style = " class='now' aria-current='step'" if i == now else ""
+        rows.append(f"<li{style} data-step='{i}'>{escape(shown.search.steps[i])}{how}{star}</li>")
+    if not total:
+        return f"{_none(shown)}<p>There is no step to show.</p>"
+    note = ""
+    if looked_for:
+        which = "a step marked * moves" if mixed else "parts move"
+        note = f"<p class='quiet'>The plan does not say how {which}: a free straight way was looked for here.</p>"
+    above = f"<p class='quiet'>… {first} before</p>" if first else ""
+    below = f"<p class='quiet'>… {total - end} more</p>" if end < total else ""
+    return f"{_none(shown)}{note}{above}<ol start='{first + 1}'>{''.join(rows)}</ol>{below}"
+
+
+def in_short(motion: Motion) -> str:
+    """How the parts of a step move, in a few words."""
+    others = [n for n in motion.parts if n != motion.action] if motion.action in motion.parts else []
+    if not others and len(motion.parts) > 1:
+        others = list(motion.parts)
+    together = f", together with {some(others)}" if others else ""
+    held = f", while {some(motion.held)} {_is(motion.held)} held" if motion.held else ""
+    return f"{_way(motion)}{together}{_making_way(motion)}{held}"
+
+
+def _none(shown: Shown) -> str:
+    """Why there is no plan; nothing where there is one."""
+    if shown.search.solved:
+        return ""
+    why = "".join(f"<li>{escape(sentence)}</li>" for sentence in shown.search.why_not)
+    because = f"<p><b>Why nothing more can be done</b></p><ul>{why}</ul>" if why else ""
+    if shown.search.refusals:
+        because += "<p>The tab Search has each refused attempt; look at one to see it in the view.</p>"
+    prefix = "the longest prefix that works is shown." if shown.search.steps else "not even a first step works."
+    return f"<p class='note'>No plan: {prefix}</p>{because}"
+
+
+def _in_sight(now: int, total: int) -> tuple[int, int]:
+    """The first step listed, and the one after the last, while step `now` is under way."""
+    if total <= BEFORE + AFTER + 1:
+        return 0, total
+    first = min(max(now - BEFORE, 0), total - BEFORE - AFTER - 1)
+    return first, first + BEFORE + AFTER + 1
+
+
+def _who(motion: Motion) -> str:
+    """The step's name; of parts that go together, all of them."""
+    name = f"<b>{escape(motion.action)}</b>"
+    if len(motion.parts) == 1:
+        return name
+    parts = f"<b>{escape(some(motion.parts))}</b>"
+    return f"{parts} together" if motion.action in motion.parts else f"{name}: {parts} together"
+
+
+def _verb(motion: Motion) -> str:
+    one = len(motion.parts) == 1
+    if motion.arrives:
+        return "comes" if one else "come"
+    return "leaves" if one else "leave"
+
+
+def _way(motion: Motion) -> str:
+    if len(motion.path) > 2:
+        return f"along a path of {len(motion.path)} poses"
+    shift = motion.path[-1, :3, 3] - motion.path[0, :3, 3]
+    shift = -shift if motion.arrives else shift
+    return f"along {in_words((shift / max(float(np.linalg.norm(shift)), 1e-300)).tolist())}"
+
+
+def _meanwhile(motion: Motion) -> str:
+    """What else happens in a step, as HTML: what makes way, and what is held, in the colour of its outline."""
+    names = f"<span style='{_HELD}'>{escape(some(motion.held))}</span>"
+    held = f", while {names} {_is(motion.held)} held" if motion.held else ""
+    return f"{escape(_making_way(motion))}{held}"
+
+
+def _making_way(motion: Motion) -> str:
+    names = [n for group, *_ in motion.aside for n in group if n not in motion.parts]
+    return f", {some(names)} making way" if names else ""
+
+
+def _is(names: Sequence[str]) -> str:
+    return "is" if len(names) == 1 else "are"
