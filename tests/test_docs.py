@@ -18,6 +18,7 @@ from pathlib import Path
 import pytest
 import typer.main
 
+from learned_priors import encoders
 from neurosym import registry
 from neurosym.cli import app, main
 from neurosym.exit_codes import EXIT_CODES
@@ -103,6 +104,7 @@ def test_outputs_are_told_apart(shown, same):
 def test_code_runs(page, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setattr(encoders, "_ENCODERS", dict(encoders._ENCODERS))
     monkeypatch.setattr("neurosym.registry._entry_points", cache(registry._entry_points.__wrapped__))
     names = {}
     printed = ""
@@ -115,12 +117,12 @@ def test_code_runs(page, tmp_path, monkeypatch, capsys):
             install(tomllib.loads(block["body"])["project"], tmp_path)
         elif block["kind"] == "text":  # what the block of Python before it prints
             assert same_output(block["body"], printed), f"printed:\n{printed}"
-        elif block["kind"] == "python":
+        elif block["kind"] == "python" and block["what"] != "file":  # a file runs where it is imported
             line = page.read_text(encoding="utf-8")[: block.start("body")].count("\n")
             capsys.readouterr()
             exec(compile("\n" * line + block["body"], str(page), "exec"), names)
             printed = capsys.readouterr().out
-        else:
+        elif block["kind"] == "console":
             allowed = {int(code) for code in re.findall(r"\d+", block["said"])} if block["what"] == "exit" else {0}
             assert allowed
             run_console(block["body"], allowed, capsys)
