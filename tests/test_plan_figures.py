@@ -19,6 +19,7 @@ from neurosym.plotting import (
     search_figure,
 )
 from neurosym.plotting.layers import box_width, in_layers, shortened
+from neurosym.plotting.routes import bends, curve
 from neurosym.plotting.search import MOST_REFUSALS, ON_PLAN, REFUSED
 from neurosym.testing.toys import NumberLine
 
@@ -103,6 +104,40 @@ def test_layers_that_are_too_wide_are_staggered_and_no_box_lies_on_another():
     for i, (left, right, y) in enumerate(boxes):
         for other_left, other_right, other_y in boxes[:i]:
             assert abs(y - other_y) > 0.15 or right < other_left or other_right < left
+
+
+def test_no_line_runs_through_the_box_of_another():
+    rng = np.random.default_rng(0)
+    for count in (3, 7, 12):
+        row = {f"p{k}": (0.2 + 3.0 * k / count, 1.0 + 0.7 * float(rng.integers(2))) for k in range(count)}
+        pairs = [(a, b) for a in row for b in row if a < b]
+        for (a, b), bend in zip(pairs, bends(pairs, row, (0.0, 0.0, 3.4, 2.7))):
+            line = curve(row[a], row[b], bend)
+            assert line.min() >= 0
+            assert (line <= (3.4, 2.7)).all()
+            for name, (x, y) in row.items():
+                inside = (abs(line[:, 0] - x) < box_width(name) / 2) & (abs(line[:, 1] - y) < 0.075)
+                assert name in (a, b) or not inside.any()
+
+
+def test_a_line_with_nothing_in_its_way_is_straight():
+    assert bends([("a", "b")], {"a": (1.0, 1.0), "b": (2.0, 1.0)}, (0.0, 0.0, 3.0, 3.0)) == [0.0]
+
+
+@pytest.mark.parametrize("count", [20, 30, 45])
+def test_rows_of_matrices_bear_names_that_can_be_read_or_numbers(count):
+    column = ns.Assembly.from_cells({f"block {z}": [(0, 0, z)] for z in range(count)})
+    figure = contact_figure(column)
+    figure.draw_without_rendering()
+    axis = figure.axes[0]
+    said = [t.get_text() for t in axis.get_yticklabels()]
+    assert said[:2] == (["block 0", "block 1"] if count <= 30 else ["1", "10"])
+    assert {t.get_fontsize() for t in axis.get_yticklabels()} <= {6.0, 7.0}
+    row = axis.get_window_extent().height / (count + 1) * 72 / figure.dpi
+    assert row >= 6 or count > 30  # points: letters of one row do not lie on the next
+    assert "20 free" in " ".join(
+        texts(blocking_figure(ns.Assembly.from_cells({f"{x}": [(x, 0, 0)] for x in range(20)})))
+    )
 
 
 def test_a_long_name_keeps_both_ends():

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import networkx as nx
 import numpy as np
-from numpy.typing import NDArray
 
-from neurosym.plotting.layers import BOX, LAYER, Layout, box_width, in_inches, in_layers, write_names
-from neurosym.plotting.style import COLOURS, COLUMN, SMALL, TITLE, tidy
+from neurosym.plotting.layers import BOX, Layout, box_width, in_inches, in_layers, write_names
+from neurosym.plotting.matrices import blocking_matrices, contact_matrix, depths
+from neurosym.plotting.routes import Point, bends
+from neurosym.plotting.style import COLOURS, COLUMN, SMALL, TITLE
 from neurosym.ways import GROUND
 
 if TYPE_CHECKING:
@@ -21,15 +22,24 @@ if TYPE_CHECKING:
     from neurosym.geometry.blocking import BlockingGraph
     from neurosym.geometry.directions import Directions
 
-#: More parts than this are drawn as a matrix; more than these have no names in it.
-MOST_NODES, MOST_NAMES = 16, 28
+#: More parts than this are drawn as a matrix.
+MOST_NODES = 16
 #: Directions that are drawn, each with its opposite; the title says how many there are.
 MOST_PANELS = 4
 
 _MARGIN = 0.08
 _WIDTH = COLUMN - 2 * _MARGIN
 _APART = 0.3  # between panels
+_CONTACT_LAYER = 0.7  # lines within a layer need room beside it
 _ONLY_TOGETHER = "#D55E00"
+_ARROW = {
+    "arrowstyle": "-|>,head_length=0.35,head_width=0.18",
+    "color": COLOURS[4],
+    "lw": 0.8,
+    "shrinkA": 0,
+    "shrinkB": 0.5,
+    "zorder": 3,
+}
 
 
 def blocking_figure(assembly: Assembly, directions: Directions = None, *, title: str = "assembly") -> Figure:
@@ -49,7 +59,7 @@ def blocking_figure(assembly: Assembly, directions: Directions = None, *, title:
     some = "" if len(chosen) == len(shown) else f"{len(shown)} of "
     said = f"{title}: what blocks what\nn = {len(assembly)} parts, {some}{len(chosen)} directions with their opposites"
     if len(assembly) > MOST_NODES:
-        return _matrices(said, graph, shown)
+        return blocking_matrices(said, graph, shown)
     layouts = [_layered(graph.graph(d)) for d in shown]
     figure, axis = in_inches(sum(each.height + _APART for _, each, _ in layouts) + 0.72)
     top = figure.get_figheight()
@@ -61,8 +71,9 @@ def blocking_figure(assembly: Assembly, directions: Directions = None, *, title:
         places = {name: (x + _MARGIN, y + top + 0.1) for name, (x, y) in layout.places.items()}
         for group in framed:
             _frame(axis, [places[name] for name in group], group)
-        for a, b in arrows:
-            _arrow(axis, places[a], places[b])
+        room = (_MARGIN, top, COLUMN - _MARGIN, top + layout.height + 0.2)
+        for pair, bend in zip(arrows, bends(arrows, places, room)):
+            _join(axis, pair, places, bend, _ARROW)
         write_names(axis, places, assembly.fixed)
     _write_note(axis, "arrow: hits, moved that way; in a frame: only together")
     return figure
@@ -85,17 +96,19 @@ def contact_figure(assembly: Assembly, *, title: str = "assembly") -> Figure:
     unit = f"{assembly.units}²" if assembly.units else "units of length²"
     said = f"{title}: what touches what\nn = {len(assembly)} parts, {len(areas)} contacts; areas in {unit}"
     if len(assembly) > MOST_NODES:
-        return _contact_matrix(said, assembly, areas, unit)
+        return contact_matrix(said, assembly, areas, unit)
     graph = nx.Graph(list(areas))
     graph.add_nodes_from(assembly.names)
     roots = [GROUND] if GROUND in graph else [n for n in assembly.names if n in assembly.fixed] or [assembly.names[0]]
-    layout = in_layers(_from(graph, roots)[::-1], list(areas), _WIDTH)
+    layout = in_layers(_from(graph, roots)[::-1], list(areas), _WIDTH, apart=_CONTACT_LAYER)
     figure, axis = in_inches(layout.height + 0.85)
     _write_title(axis, said)
     places = {name: (x + _MARGIN, y + 0.35) for name, (x, y) in layout.places.items()}
     largest = max(areas.values(), default=1.0)
-    for pair, area in areas.items():
-        _line(axis, places[pair[0]], places[pair[1]], _thickness(area, largest))
+    room = (_MARGIN, 0.25, COLUMN - _MARGIN, layout.height + 0.4)
+    for (pair, area), bend in zip(areas.items(), bends(list(areas), places, room)):
+        look = {"arrowstyle": "-", "color": COLOURS[4], "lw": _thickness(area, largest), "shrinkA": 0, "shrinkB": 0}
+        _join(axis, pair, places, bend, look)
     write_names(axis, places, [*assembly.fixed, GROUND])
     _write_widths(axis, list(areas.values()))
     return figure
@@ -125,7 +138,7 @@ def _in_words(graph: BlockingGraph, d: int) -> str:
 def _layered(graph: nx.DiGraph) -> tuple[list[tuple[str, ...]], Layout, list[tuple[str, str]]]:
     """Groups that leave only together, where the parts are, and the arrows that do not follow from others."""
     whole = nx.condensation(graph)
-    depth = _depths(whole)
+    depth = depths(whole)
     layers: list[list[str]] = [[] for _ in range(max(depth.values()) + 1)]
     for node in sorted(whole, key=lambda k: min(whole.nodes[k]["members"])):
         layers[depth[node]] += sorted(whole.nodes[node]["members"])
@@ -140,14 +153,6 @@ def _layered(graph: nx.DiGraph) -> tuple[list[tuple[str, ...]], Layout, list[tup
         arrows.append(pairs[0])  # of two groups, one arrow says it
     framed = [tuple(sorted(whole.nodes[k]["members"])) for k in whole if len(whole.nodes[k]["members"]) > 1]
     return framed, in_layers(layers, arrows, _WIDTH), arrows
-
-
-def _depths(whole: nx.DiGraph) -> dict[int, int]:
-    """How many others have to leave, one after the other, before a node is free."""
-    depth: dict[int, int] = {}
-    for node in reversed(list(nx.topological_sort(whole))):
-        depth[node] = 1 + max((depth[b] for b in whole.successors(node)), default=-1)
-    return depth
 
 
 def _from(graph: nx.Graph, roots: Sequence[str]) -> list[list[str]]:
@@ -173,11 +178,16 @@ def _write_note(axis: Axes, said: str) -> None:
     axis.text(COLUMN / 2, 0.09, said, fontsize=SMALL, ha="center", va="center")
 
 
-def _arrow(axis: Axes, start: tuple[float, float], end: tuple[float, float]) -> None:
-    bend = 0.25 if abs(start[1] - end[1]) > 1.2 * LAYER else 0.0
-    look = {"arrowstyle": "-|>,head_length=0.35,head_width=0.18", "color": COLOURS[4], "lw": 0.8}
-    bent = {"shrinkA": 6, "shrinkB": 6.5, "connectionstyle": f"arc3,rad={bend}"}
-    axis.annotate("", end, start, arrowprops={**look, **bent}, zorder=3)
+def _join(axis: Axes, pair: tuple[str, str], places: Mapping[str, Point], bend: float, look: Mapping[str, Any]) -> None:
+    """A line from one box to another, from edge to edge."""
+    from matplotlib.patches import Rectangle
+
+    patches = []
+    for name in pair:
+        (x, y), wide = places[name], box_width(name)
+        patches.append(Rectangle((x - wide / 2, y - BOX / 2), wide, BOX, transform=axis.transData))
+    ends = {"patchA": patches[0], "patchB": patches[1], "connectionstyle": f"arc3,rad={bend}"}
+    axis.annotate("", places[pair[1]], places[pair[0]], arrowprops={**look, **ends}, zorder=look.get("zorder", 1))
 
 
 def _frame(axis: Axes, places: Sequence[tuple[float, float]], names: Sequence[str]) -> None:
@@ -199,16 +209,8 @@ def _frame(axis: Axes, places: Sequence[tuple[float, float]], names: Sequence[st
     axis.add_patch(patch)
 
 
-def _line(axis: Axes, a: tuple[float, float], b: tuple[float, float], width: float) -> None:
-    # In one layer a straight line would run through what lies between.
-    bend = 0.35 if abs(a[1] - b[1]) < 1.2 * LAYER / 2 else 0.12 if abs(a[1] - b[1]) > 1.2 * LAYER else 0.0
-    a, b = sorted((a, b))
-    look = {"arrowstyle": "-", "color": COLOURS[4], "lw": width, "shrinkA": 0, "shrinkB": 0}
-    axis.annotate("", b, a, arrowprops={**look, "connectionstyle": f"arc3,rad={bend}"}, zorder=1)
-
-
 def _thickness(area: float, largest: float) -> float:
-    return 0.4 + 2.0 * float(np.sqrt(area / largest))
+    return 0.4 + 1.6 * float(np.sqrt(area / largest))
 
 
 def _write_widths(axis: Axes, areas: Sequence[float]) -> None:
@@ -220,62 +222,3 @@ def _write_widths(axis: Axes, areas: Sequence[float]) -> None:
         x = COLUMN / 2 + (k - (len(shown) - 1) / 2) * 1.2 - 0.3
         axis.plot([x - 0.15, x + 0.1], [0.1, 0.1], color=COLOURS[4], lw=_thickness(area, max(areas)))
         axis.text(x + 0.17, 0.1, f"area {area:.3g}", fontsize=SMALL, va="center")
-
-
-# -- matrices -------------------------------------------------------------------------------------------------
-
-
-def _matrices(title: str, graph: BlockingGraph, shown: Sequence[int]) -> Figure:
-    from matplotlib.figure import Figure
-
-    from neurosym.geometry.blocking import bits
-
-    columns = min(2, len(shown))
-    rows = -(-len(shown) // columns)
-    figure = Figure(figsize=(COLUMN, 0.8 + rows * (COLUMN / columns + 0.1)), layout="constrained")
-    axes = figure.subplots(rows, columns, squeeze=False).ravel()
-    n = len(graph.names)
-    for axis in axes[len(shown) :]:
-        axis.remove()
-    for axis, d in zip(axes, shown):
-        hits = np.zeros((n, n))
-        for i in range(n):
-            hits[i, bits(graph.by_part[d][i])] = 1.0
-        whole = nx.condensation(graph.graph(d))
-        depth = _depths(whole)
-        own = {name: depth[k] for k in whole for name in whole.nodes[k]["members"]}
-        order = sorted(range(n), key=lambda i: (own[graph.names[i]], i))
-        axis.imshow(hits[np.ix_(order, order)], cmap="Blues", vmin=0, vmax=1.2, interpolation="nearest")
-        axis.set_title(f"along {graph.describe(d)}: {int(hits.sum())} hits", fontsize=SMALL, pad=3)
-        _dress(axis, [graph.names[i] for i in order], names=n <= MOST_NAMES and columns == 1)
-    figure.suptitle(title, fontsize=TITLE)
-    figure.supxlabel("hits this part (the free ones first)", fontsize=SMALL)
-    figure.supylabel("this part, moved that way", fontsize=SMALL)
-    return figure
-
-
-def _contact_matrix(title: str, assembly: Assembly, areas: dict[tuple[str, str], float], unit: str) -> Figure:
-    from matplotlib.figure import Figure
-
-    names = [*assembly.names, *([GROUND] if assembly.has_table else [])]
-    index = {name: i for i, name in enumerate(names)}
-    table: NDArray[np.float64] = np.full((len(names), len(names)), np.nan)
-    for (a, b), area in areas.items():
-        table[index[a], index[b]] = table[index[b], index[a]] = area
-    figure = Figure(figsize=(COLUMN, COLUMN + 0.5), layout="constrained")
-    axis = figure.subplots()
-    drawn = axis.imshow(table, cmap="viridis_r", vmin=0, vmax=max(areas.values(), default=1.0), interpolation="nearest")
-    _dress(axis, names, names=len(names) <= MOST_NAMES)
-    bar = figure.colorbar(drawn, ax=axis, shrink=0.7)
-    bar.set_label(f"area ({unit})", fontsize=SMALL)
-    bar.ax.tick_params(labelsize=SMALL)
-    figure.suptitle(title, fontsize=TITLE)
-    return figure
-
-
-def _dress(axis: Axes, labels: Sequence[str], *, names: bool) -> None:
-    tidy(axis, sides=())
-    if names:
-        axis.set_xticks(range(len(labels)), labels, rotation=90, fontsize=5)
-        axis.set_yticks(range(len(labels)), labels, fontsize=5)
-    axis.tick_params(length=0 if names else 2)

@@ -33,13 +33,16 @@ class Layout:
     height: float
 
 
-def in_layers(layers: Sequence[Sequence[str]], edges: Sequence[tuple[str, str]], width: float) -> Layout:
+def in_layers(
+    layers: Sequence[Sequence[str]], edges: Sequence[tuple[str, str]], width: float, *, apart: float = LAYER
+) -> Layout:
     """Names in layers, the first on top, each layer sorted so that few edges cross.
 
     Args:
         layers: names, each once; their order is where the sorting starts.
         edges: pairs of names that are joined.
         width: of the drawing (inches); a layer that is wider is staggered.
+        apart: from one layer to the next (inches).
     """
     graph = nx.Graph([(a, b) for a, b in edges if a != b])
     graph.add_nodes_from(name for layer in layers for name in layer)
@@ -66,8 +69,8 @@ def in_layers(layers: Sequence[Sequence[str]], edges: Sequence[tuple[str, str]],
             else:
                 x = widest / 2 + (width - widest) * k / (len(layer) - 1)
             places[name] = (x, -(depth + STAGGER * (k % rows)))
-        depth += STAGGER * (rows - 1) + LAYER
-    height = depth - LAYER + BOX
+        depth += STAGGER * (rows - 1) + apart
+    height = depth - apart + BOX
     return Layout({name: (x, y + height) for name, (x, y) in places.items()}, height)
 
 
