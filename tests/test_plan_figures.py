@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import matplotlib.colors
 import numpy as np
 import pytest
+from matplotlib.text import Text
 
 import neurosym as ns
 from neurosym.plotting import (
@@ -253,6 +255,23 @@ def test_scores_of_several_priors_and_of_unsure_lengths(tmp_path):
     assert "40% ends" in texts(figure)
     assert figure.get_figwidth() == COLUMN
     assert save(figure, tmp_path / "scores.png").stat().st_size > 1000
+
+
+@pytest.mark.parametrize("count", [3, 8, 28, 42])
+def test_letters_of_scores_can_be_read_and_lie_on_no_others(count):
+    names = [f"remove({100 + k})" for k in range(count)]
+    scores = ns.OrderScores.from_order(list(range(count)), names, confidence=0.5)
+    figure = scores_figure({"one": scores, "two": scores}, plan=names)
+    figure.draw_without_rendering()
+    assert min(t.get_fontsize() for t in figure.findobj(Text) if t.get_text()) >= 6
+    below = [axis for axis in figure.axes if any(t.get_text() for t in axis.get_xticklabels()) and axis.images]
+    for axis in below:
+        labels = [t for t in axis.get_xticklabels() if t.get_text()]
+        boxes = [t.get_window_extent() for t in labels]
+        assert not any(a.overlaps(b) for a, b in itertools.pairwise(boxes))
+        if count <= 30:
+            assert [t.get_text() for t in labels] == [str(100 + k) for k in range(count)]
+    assert ("action (number)" in texts(figure)) == (count > 30)
 
 
 # -- training -------------------------------------------------------------------------------------------------

@@ -82,6 +82,14 @@ def shortened(name: str, most: int = MOST_LETTERS) -> str:
     return name[: most - 1 - tail] + "…" + name[len(name) - tail :]
 
 
+def without_common(names: Sequence[str]) -> dict[str, str]:
+    """Names without what all of them share: ``remove(leg)`` among removals is ``leg``."""
+    heads = {name.partition("(")[0] for name in names}
+    if len(heads) == 1 and all(name.endswith(")") and "(" in name for name in names):
+        return {name: name.partition("(")[2][:-1] for name in names}
+    return {name: name for name in names}
+
+
 def box_width(name: str) -> float:
     """Of the box around a name (inches)."""
     return LETTER_WIDTH * len(shortened(name)) + 0.08

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from neurosym.plotting.layers import shortened, without_common
 from neurosym.plotting.style import COLOURS, COLUMN, SMALL, TITLE, tidy
 from neurosym.prior import OrderScores
 
@@ -15,7 +16,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 #: With more actions than these no probability is written into its cell, and then no names beside it.
-WRITTEN, MOST_NAMES = 8, 40
+WRITTEN, MOST_NAMES = 8, 30
+#: Smallest letters (points).
+_LETTERS = 6
 
 
 def scores_figure(
@@ -61,7 +64,9 @@ def scores_figure(
     bar.set_label("probability", fontsize=SMALL)
     figure.suptitle(f"{title}: n = {first.n_steps} steps × {first.n_actions} actions", fontsize=TITLE)
     for axis in axes[: len(given)][-columns:]:
-        axis.set_xlabel("action" if first.actions else "action (number)", fontsize=TITLE)
+        axis.set_xlabel(
+            "action" if first.actions and first.n_actions <= MOST_NAMES else "action (number)", fontsize=TITLE
+        )
     figure.supylabel("step", fontsize=TITLE)
     _legend(figure, with_plan=bool(plan))
     return figure
@@ -81,20 +86,21 @@ def _mark(axis: Axes, own: OrderScores, plan: Sequence[str]) -> None:
 
 def _dress(axis: Axes, own: OrderScores, *, first_column: bool, last_row: bool) -> None:
     n = own.n_actions
-    names = list(own.actions) if own.actions else [str(i) for i in range(n)]
+    short = without_common(own.actions)
+    names = [shortened(short[name]) for name in own.actions] or [str(i) for i in range(n)]
     if n <= MOST_NAMES:
         long = max(map(len, names), default=0) > 2
-        size = SMALL if n <= 20 else 5
-        axis.set_xticks(range(n), names if last_row else [""] * n, rotation=90 if long else 0, fontsize=size)
+        axis.set_xticks(range(n), names if last_row else [""] * n, rotation=90 if long else 0)
     every = max(1, -(-own.n_steps // 15))
     steps = range(0, own.n_steps, every)
     axis.set_yticks(steps, [str(s + 1) for s in steps] if first_column else [""] * len(steps))
     tidy(axis, sides=("top", "right", "left", "bottom"))
     axis.tick_params(length=0, pad=1)
+    axis.tick_params(axis="x", labelsize=SMALL if n <= 20 else _LETTERS)
     if own.log_length is not None:
         for step, log in enumerate(own.log_length[1:]):
             said = f"{100 * np.exp(log):.0f}% ends"
-            axis.text(n - 0.4, step, said, fontsize=5.5, va="center", ha="left", color="0.3")
+            axis.text(n - 0.4, step, said, fontsize=_LETTERS, va="center", ha="left", color="0.3")
 
 
 def _write(axis: Axes, own: OrderScores, *, small: bool) -> None:
@@ -102,7 +108,9 @@ def _write(axis: Axes, own: OrderScores, *, small: bool) -> None:
         for j, p in enumerate(row):
             if p >= 0.005:  # what rounds to 0% is left out
                 colour = "white" if p > 0.3 else "black"
-                axis.text(j, i, f"{100 * p:.0f}", ha="center", va="center", fontsize=5 if small else 6.5, color=colour)
+                axis.text(
+                    j, i, f"{100 * p:.0f}", ha="center", va="center", fontsize=_LETTERS if small else 6.5, color=colour
+                )
 
 
 def _legend(figure: Figure, *, with_plan: bool) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from neurosym.planner import PlanResult
 from neurosym.plotting.labels import width_of
-from neurosym.plotting.layers import shortened
+from neurosym.plotting.layers import shortened, without_common
 from neurosym.plotting.style import COLOURS, COLUMN, SMALL, TITLE
 
 if TYPE_CHECKING:
@@ -99,7 +99,7 @@ def _tree(result: PlanResult) -> tuple[_Node, int]:
     root = _Node(0)
     shown = result.blame[:MOST_REFUSALS]
     names = [r.action for r in shown] + [a for r in shown for a in r.after] + list(result.plan or result.best_prefix)
-    short = _shorter(names)
+    short = without_common(names)
     for refusal in shown:
         _reach(root, [short[a] for a in refusal.after])[-1].refused.append(short[refusal.action])
     for node in _reach(root, [short[a] for a in (result.plan or result.best_prefix)]):
@@ -113,14 +113,6 @@ def _reach(root: _Node, actions: Sequence[str]) -> list[_Node]:
     for action in actions:
         way.append(way[-1].next.setdefault(action, _Node(way[-1].step + 1)))
     return way
-
-
-def _shorter(names: Sequence[str]) -> dict[str, str]:
-    """Names without what all of them share: ``remove(leg)`` among removals is ``leg``."""
-    heads = {name.partition("(")[0] for name in names}
-    if len(heads) == 1 and all(name.endswith(")") and "(" in name for name in names):
-        return {name: name.partition("(")[2][:-1] for name in names}
-    return {name: name for name in names}
 
 
 def _all(node: _Node) -> Iterator[_Node]:
