@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import itertools
 import json
 import shutil
@@ -17,20 +18,24 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from PIL import Image
 
 import neurosym as ns
 from neurosym.cli import main
 from neurosym.geometry.meshes import signed_volume
 from neurosym.motions import Motion, Staging, stage, steps_in_space
+from neurosym.testing import burrs
 from neurosym.viewer import panels, score_table
+from neurosym.viewer.attempts import BECAUSE, FEW, MOST_COUNTED, MOST_REFUSALS, attempts, most_refused
+from neurosym.viewer.attempts import REFUSED as TRIED
 from neurosym.viewer.export import PAUSE, SECONDS_PER_STEP, _with_panel
 from neurosym.viewer.facts import part_facts
 from neurosym.viewer.follow import follower
-from neurosym.viewer.planning import Planning, problem_maker
+from neurosym.viewer.planning import Planning, options_of, problem_maker
 from neurosym.viewer.shown import Query, Search, Shown
 from neurosym.viewer.solids import solids
 from neurosym.viewer.sources import open_source
-from neurosym.viewer.steps import AFTER, BEFORE, caption, steps
+from neurosym.viewer.steps import AFTER, BEFORE, HELD, caption, steps
 from neurosym.viewer.timeline import ABSENT, APART, IN_PLACE, ON_PATH, Timeline
 
 UP = (0.0, 0.0, 1.0)
@@ -368,11 +373,13 @@ def test_panels_escape_what_names_hold(shown):
         panels.overview(nasty),
         steps(nasty, 0),
         caption(nasty, 0.0),
-        panels.refusals(search),
+        attempts(search),
         score_table.scores_table(scores, [evil], [evil]),
         panels.facts(part_facts(world, "b", world.names)),
         panels.facts(part_facts(world, evil, world.names)),
         panels.message(evil),
+        panels.options(evil, {"a": evil}),
+        most_refused(replace(search, refusals=search.refusals * FEW)),
     ]
     for text in texts:
         assert "<img src=x" not in text
@@ -451,11 +458,38 @@ def test_attempts_come_in_order_with_the_plan_between():
         ns.Refusal(("a", "x"), "y", "elsewhere"),
     )
     search = make_search(("a", "b"), refusals)
-    text = panels.refusals(search)
+    text = attempts(search)
     places = [text.index(w) for w in ("b is under a", "1. a<", "c is fixed", "elsewhere", "2. b<")]
     assert places == sorted(places)
-    many = make_search((), refusals[:1] * (panels.MOST_REFUSALS + 7))
-    assert "7 more refusals" in panels.refusals(many)
+    many = make_search((), refusals[:1] * (MOST_REFUSALS + 7))
+    assert "7 more refusals" in attempts(many)
+
+
+def test_of_many_refusals_those_about_the_one_looked_at_are_listed():
+    many = [ns.Refusal((), f"a{i}", f"reason {i}.") for i in range(1, 2 * MOST_REFUSALS + 8)]
+    many[-1] = ns.Refusal(("x",), "late", "reason late.")
+    search = make_search(("x", "y"), tuple(many))
+    for around, first, last in [(0, 1, 300), (1, 1, 300), (300, 1, 300), (301, 301, 600), (606, 601, 607)]:
+        text = attempts(search, around)
+        assert f"Refusals {first} to {last} of 607" in text
+        assert (f"✘ {first}. " in text, f"✘ {last}. " in text) == (True, True)
+        assert text.count("✘") == last - first + 1
+        assert text.count("✔") == 2, "each step of the plan is listed once, on every page"
+    assert attempts(search, 606).index("✔ 1.") < attempts(search, 606).index("✘ 607.")
+
+
+def test_what_was_refused_most_often_is_counted():
+    few = tuple(ns.Refusal((), "a", "why") for _ in range(FEW))
+    assert most_refused(make_search((), few)) == ""
+    others = (ns.Refusal((), "b", "once"), ns.Refusal((), "a", "else"))
+    text = most_refused(make_search((), few + others))
+    assert f"<b>a</b> {FEW + 1}×: why" in text
+    assert f"({FEW}×)" in text
+    assert "<b>b</b> 1×: once</li>" in text
+    assert text.index("<b>a</b>") < text.index("<b>b</b>")
+    many = most_refused(make_search((), tuple(ns.Refusal((), f"a{i}", "r") for i in range(FEW + 10))))
+    assert many.count("<li>") == MOST_COUNTED
+    assert f"and {FEW + 10 - MOST_COUNTED} more actions" in many
 
 
 def make_search(steps, refusals):
@@ -652,8 +686,34 @@ def test_cells_travel_with_their_plan(tmp_path, capsys):
     assert source.query.domain == name == "plan.json"
     again = problem_maker(replace(source.query, options=RIGID), source.given)()
     assert again.actions == ("a", "b")
-    with pytest.raises(ns.InputError, match="options"):
-        problem_maker(replace(source.query, options={"nonsense": 1}), source.given)()
+    with pytest.raises(ns.InputError, match=r"among collapse, .*; got nonsense"):
+        problem_maker(replace(source.query, options={"nonsense": 1}), source.given)
+
+
+def test_an_assembly_can_be_planned_again_with_its_options(tmp_path):
+    ns.Assembly.from_cells({"low": [(0, 0, 0)], "high": [(0, 0, 1)]}).save(tmp_path / "box.json")
+    source = open_source(Query(str(tmp_path / "box.json"), options={"held": 1}))
+    known = options_of(source.given["box.json"])
+    assert (known["held"], known["gravity"]) == (0, True)
+    again = problem_maker(replace(source.query, options={"gravity": False, "directions": "+z"}), source.given)()
+    assert ns.solve(again).plan == ("high", "low")
+    with pytest.raises(ns.InputError, match=r"box\.json.*; got collapse"):
+        problem_maker(replace(source.query, options={"collapse": "rigid"}), source.given)
+
+
+def test_the_film_of_a_prefix_shows_how_its_steps_are_done(tmp_path):
+    ns.Assembly.from_cells(burrs.PAIRS.cells).save(tmp_path / "pairs.json")
+    query = Query(str(tmp_path / "pairs.json"), options={"groups": True}, prior="outermost-first")
+    source = open_source(query)
+    planning = Planning(lambda: source.problem, source.query)
+    assert planning.wait(60)
+    shown = planning.shown
+    assert not shown.search.solved
+    assert shown.search.steps
+    first = shown.timeline.staging.motions[0]
+    assert not first.arrives
+    assert len(first.parts) == 2
+    assert first.given
 
 
 def test_an_assembly_is_planned_as_plan_plans_it(tmp_path, capsys):
@@ -710,7 +770,19 @@ def test_without_viser_the_extra_is_named(monkeypatch, capsys):
 
 
 def test_the_model_loads_no_viser():
-    pure = ("timeline", "facts", "solids", "panels", "steps", "follow", "score_table", "look", "planning", "sources")
+    pure = (
+        "timeline",
+        "facts",
+        "solids",
+        "panels",
+        "steps",
+        "attempts",
+        "follow",
+        "score_table",
+        "look",
+        "planning",
+        "sources",
+    )
     names = ", ".join(f"neurosym.viewer.{name}" for name in pure)
     code = f"import sys, neurosym.cli, {names}; assert 'viser' not in sys.modules"
     subprocess.run([sys.executable, "-c", code], check=True)
@@ -834,14 +906,49 @@ def test_the_prior_and_the_search_are_there_to_read(tab, viewer, shown):
     tab.get_by_text(shown.search.refusals[0].reason).first.wait_for()
 
 
+def test_parts_are_seen_in_their_own_colours(tab, viewer, shown):
+    viewer.show(shown)
+    viewer.names.value = False
+    first = viewer.scene.parts[shown.timeline.names.index(shown.search.steps[0])]
+    own = [np.array(part.color) for part in viewer.scene.parts]
+    assert tuple(first.color) in [tuple(c) for c in own]
+    # All parts are set down in the end, and each is seen.
+    viewer.slider.value = 7.0
+    end = time.monotonic() + 60.0
+    while True:
+        tab.wait_for_timeout(1000)
+        seen = np.asarray(Image.open(io.BytesIO(tab.locator("canvas").first.screenshot())).convert("RGB"), dtype=float)
+        # How far the nearest of all points is from a part's colour, of 255.
+        off = [float(np.abs(seen - colour).max(axis=2).min()) for colour in own]
+        if max(off) < 40 or time.monotonic() > end:
+            break
+    assert max(off) < 40, dict(zip(shown.timeline.names, off))
+    viewer.slider.value = 0.0
+
+
+def test_what_is_held_has_a_bold_outline_while_the_step_is_done(viewer, shown):
+    motions = shown.timeline.staging.motions
+    held = motions[-1].action
+    viewer.show(staged(shown, [replace(motions[0], held=(held,)), *motions[1:]]))
+    outlines = viewer.scene._outlines
+    usual = {name: outline.thickness for name, outline in outlines.items()}
+    viewer.scene.show(0.5)
+    assert (outlines[held].colors == HELD).all()
+    assert {n for n, outline in outlines.items() if outline.thickness > usual[n]} == {held}
+    viewer.scene.show(1.5)
+    assert {name: outline.thickness for name, outline in outlines.items()} == usual
+    assert len({tuple(outline.colors.reshape(-1, 3)[0]) for outline in outlines.values()}) == 1
+    viewer.show(shown)
+
+
 def test_a_refusal_shows_what_stood_in_the_way(viewer, shown):
     viewer.show(shown)
     refusal = shown.search.refusals[0]
     own = dict(zip(shown.timeline.names, [tuple(part.color) for part in viewer.scene.parts]))
     viewer.refusal.value = 1
     colours = dict(zip(shown.timeline.names, [tuple(part.color) for part in viewer.scene.parts]))
-    assert {n for n, c in colours.items() if c == panels.REFUSED} == {refusal.action}
-    assert {n for n, c in colours.items() if c == panels.BECAUSE} == set(refusal.because) - {refusal.action}
+    assert {n for n, c in colours.items() if c == TRIED} == {refusal.action}
+    assert {n for n, c in colours.items() if c == BECAUSE} == set(refusal.because) - {refusal.action}
     assert refusal.reason in viewer.refusal_said.content
     if shown.search.steps[: len(refusal.after)] == refusal.after:
         assert viewer.slider.value == len(refusal.after)
@@ -872,6 +979,30 @@ def test_one_can_plan_again(tab, viewer):
     tab.get_by_text("soma-3").first.wait_for()
     assert viewer.slider.value == 0.0
     assert len(viewer.scene.parts) == 7
+
+
+def test_another_domain_brings_its_own_options(tab, viewer):
+    form = viewer.form
+    tab.get_by_role("tab", name="Plan again").click()
+    form.domain.value = "soma"
+    form.number.value, form.options.value = "5", "collapse=rigid"
+    form.domain.value = "tower"
+    until(lambda: form.options.value == "")
+    assert form.number.value == "0"
+    tab.get_by_text("tower takes").get_by_text("variant").wait_for()
+    assert viewer.form.asked().options == {}
+    form.options.value = "collapse=rigid"
+    tab.get_by_role("button", name="Plan again").click()
+    tab.get_by_role("alert").get_by_text("Expected options of 'tower' among variant").wait_for()
+    form.options.value = ""
+    form.domain.value = "slow"
+    until(lambda: form.number.disabled)
+    assert form.number.value == ""
+    form.domain.value = "soma"
+    until(lambda: form.options.value == "collapse=rigid")
+    assert form.number.value == "5"
+    assert not form.number.disabled
+    tab.get_by_text("soma takes").get_by_text("collapse").wait_for()
 
 
 def test_stop_ends_a_search(tab, viewer):

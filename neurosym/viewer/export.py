@@ -10,6 +10,7 @@ import numpy as np
 from neurosym.errors import InputError
 from neurosym.files import write_text
 from neurosym.viewer import panels
+from neurosym.viewer.attempts import attempts, most_refused
 from neurosym.viewer.follow import follower
 from neurosym.viewer.scene import PlanScene
 from neurosym.viewer.score_table import scores_table
@@ -76,7 +77,7 @@ def _with_panel(film: str, shown: Shown) -> str:
         f"<p class='quiet hint'>A click on a step goes there and waits; the player's button plays on.</p>"
         f"<h3>Prior</h3>{scores_table(search.scores, shown.problem.actions, search.steps)}"
         f"<h3>Reference</h3>{panels.pictures(shown.pictures)}"
-        f"<h3>Attempts, in order</h3>{panels.refusals(search)}"
+        f"<h3>Attempts, in order</h3>{most_refused(search)}{attempts(search)}"
     )
     style = (
         f"<style>body{{margin:0}}#root{{position:fixed!important;inset:0 {PANEL}px 0 0!important;width:auto!important}}"

@@ -12,8 +12,8 @@ from neurosym.errors import InputError
 from neurosym.pipeline import ORACLES
 from neurosym.registry import domain_names, planner_names, prior_names
 from neurosym.viewer import panels
-from neurosym.viewer.planning import Planning
-from neurosym.viewer.shown import Maker, Query
+from neurosym.viewer.planning import Planning, maker_of, options_of
+from neurosym.viewer.shown import REFUSED, Maker, Query
 
 NO_PRIOR = "none"
 
@@ -34,9 +34,10 @@ class Form:
         number = "" if query.number is None else str(query.number)
         self.number = gui.add_text("Problem", number, hint="its number")
         self.options = gui.add_text(
-            "Options", _written(query.options), hint='of the domain: collapse=rigid; removed=["V"]'
+            "Options", _written(query.options), hint='of the domain, as key=value; removed=["V"]'
         )
         planners = _offered(*planner_names(), query.planner)
+        self.takes = gui.add_html("")
         self.planner = gui.add_dropdown("Planner", planners, initial_value=query.planner)
         self.prior = gui.add_dropdown("Prior", _offered(NO_PRIOR, *prior_names(), prior), initial_value=prior)
         self.oracle = gui.add_dropdown("Oracle", ORACLES, initial_value=query.oracle)
@@ -47,6 +48,32 @@ class Form:
         self.stop = gui.add_button("Stop", icon=viser.Icon.PLAYER_STOP, color="red", disabled=True)
         self.bar = gui.add_progress_bar(0.0, animated=True, visible=False)
         self.message = gui.add_html("")
+        self._asked_of, self._typed = query.domain, dict[str, tuple[str, str]]()
+        self._tell_options()
+        self.domain.on_update(lambda _: self._other_domain())
+
+    def _other_domain(self) -> None:
+        """Another domain was chosen: its number and options are those that were typed for it before, or none."""
+        domain = self.domain.value
+        if domain == self._asked_of:
+            return
+        self._typed[self._asked_of] = self.number.value, self.options.value
+        self._asked_of = domain
+        number, options = self._typed.get(domain, ("" if domain in self.given else "0", ""))
+        assign(self.number, number)
+        assign(self.options, options)
+        self._tell_options()
+
+    def _tell_options(self) -> None:
+        """Say under the field which options the domain takes."""
+        domain = self.domain.value
+        self.number.disabled = domain in self.given
+        try:
+            known = options_of(maker_of(domain, self.given))
+        except REFUSED as error:
+            self.takes.content = panels.styled(panels.message(str(error)))
+            return
+        self.takes.content = panels.styled(panels.options(domain, known))
 
     def asked(self) -> Query:
         """What the form says.

@@ -11,6 +11,8 @@ import viser
 from neurosym.errors import InputError
 from neurosym.language.domain import Problem
 from neurosym.viewer import panels
+from neurosym.viewer.attempts import BECAUSE, MOST_REFUSALS, attempts, looked_at, most_refused
+from neurosym.viewer.attempts import REFUSED as TRIED
 from neurosym.viewer.facts import part_facts
 from neurosym.viewer.form import Form, assign
 from neurosym.viewer.planning import Planning, check_query, problem_maker
@@ -139,11 +141,17 @@ class Page:
             + "<p><b>Reference</b></p>"
             + panels.pictures(shown.pictures)
         )
-        self.search_tab.content = panels.styled(panels.refusals(search))
+        self._list_attempts(0)
         self.refusal.max, self.refusal.disabled = max(len(search.refusals), 1), not search.refusals
         assign(self.refusal, 0)
         self.refusal_said.content = ""
         self._step_shown = self._facts_for = None
+
+    def _list_attempts(self, around: int) -> None:
+        """List attempts: where there are too many, those about a refusal by its number."""
+        if self.shown is not None:
+            search = self.shown.search
+            self.search_tab.content = panels.styled(most_refused(search) + attempts(search, around))
 
     # -- the film ---------------------------------------------------------------------------------------------
 
@@ -206,7 +214,9 @@ class Page:
                 return
             assign(self.part, NO_PART)
             refusal = shown.search.refusals[number - 1]
-            self.refusal_said.content = panels.styled(panels.looked_at(number, refusal))
+            self.refusal_said.content = panels.styled(looked_at(number, refusal))
+            if len(shown.search.refusals) > MOST_REFUSALS:
+                self._list_attempts(number)
             timeline = shown.timeline
             if timeline is None:
                 return
@@ -214,9 +224,9 @@ class Page:
             if shown.search.steps[:depth] == refusal.after:
                 self._play(False)
                 assign(self.slider, float(depth))
-            colours: dict[str, tuple[int, int, int] | None] = dict.fromkeys(refusal.because, panels.BECAUSE)
+            colours: dict[str, tuple[int, int, int] | None] = dict.fromkeys(refusal.because, BECAUSE)
             tried = {m.action: m.parts for m in timeline.staging.motions}.get(refusal.action, (refusal.action,))
-            self.scene.stand_out(colours | dict.fromkeys(tried, panels.REFUSED))
+            self.scene.stand_out(colours | dict.fromkeys(tried, TRIED))
 
     def _tell_facts(self) -> None:
         timeline = self.shown.timeline if self.shown else None

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import base64
 import io
-from collections.abc import Sequence
+import json
+from collections.abc import Mapping, Sequence
 from html import escape
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,18 +16,11 @@ from PIL import Image
 from neurosym.viewer.facts import PartFacts
 
 if TYPE_CHECKING:
-    from neurosym.planner import Refusal
     from neurosym.viewer.planning import Progress
-    from neurosym.viewer.shown import Search, Shown
-
-#: Refusals written out; a hard search has thousands.
-MOST_REFUSALS = 300
+    from neurosym.viewer.shown import Shown
 
 #: Width of pictures (CSS pixels), as wide as the panel beside the view.
 WIDTH = 360
-
-#: Colours (0..255) of what was refused, and of what the refusal is due to.
-REFUSED, BECAUSE = (213, 94, 0), (0, 114, 178)
 
 
 def overview(shown: Shown) -> str:
@@ -52,47 +46,6 @@ def progress(now: Progress, *, stopping: bool) -> str:
 def some(names: Sequence[str]) -> str:
     """Names with commas; the many by their first and their number."""
     return ", ".join(names[:12]) + (f" and {len(names) - 12} more" if len(names) > 12 else "")
-
-
-def refusals(search: Search) -> str:
-    """Attempts in the order in which they were made: refused ones with their reasons, and the steps of the plan."""
-    rows: list[str] = []
-    on_path, done = search.steps, 0
-    for number, refusal in enumerate(search.refusals[:MOST_REFUSALS], 1):
-        depth = len(refusal.after)
-        if on_path[:depth] == refusal.after:
-            rows.extend(_kept(i, on_path[i]) for i in range(done, depth))
-            done = max(done, depth)
-        rows.append(refused(number, refusal))
-    left = len(search.refusals) - MOST_REFUSALS
-    if left > 0:
-        rows.append(f"<p class='note'>… and {left:,} more refusals.</p>")
-    rows.extend(_kept(i, on_path[i]) for i in range(done, len(on_path)))
-    return "".join(rows) or "<p>Nothing was attempted.</p>"
-
-
-def _kept(step: int, action: str) -> str:
-    return f"<p style='margin:2px 0;color:#00724f'><b>✔ {step + 1}. {escape(action)}</b></p>"
-
-
-def refused(number: int, refusal: Refusal) -> str:
-    """One refused attempt, with its reason."""
-    after = escape(", ".join(refusal.after)) or "nothing"
-    return (
-        f"<p style='margin:2px 0 2px 14px'><span style='color:#b04a00'>✘ {number}. not <b>{escape(refusal.action)}</b>"
-        f"</span> <span class='quiet'>after {after}</span><br>{escape(refusal.reason)}</p>"
-    )
-
-
-def looked_at(number: int, refusal: Refusal) -> str:
-    """The refusal that the 3D view shows, and what its colours mean."""
-    legend = "in the view: <b style='color:#d55e00'>what was refused</b>"
-    if refusal.because:
-        legend += ", <b style='color:#0072b2'>what it is due to</b>"
-    return (
-        "<div style='border-left:4px solid #0072B2;background:#eef5fa;color:#222;padding:4px 8px'>"
-        f"{refused(number, refusal)}<span class='quiet'>{legend}</span></div>"
-    )
 
 
 def pictures(views: NDArray[np.uint8] | None) -> str:
@@ -142,6 +95,22 @@ def _table(rows: Sequence[tuple[str, str]]) -> str:
         for a, b in rows
     )
     return f"<table>{cells}</table>"
+
+
+def options(domain: str, known: Mapping[str, Any] | None) -> str:
+    """Which options a domain takes, with what they are where nobody says; None: any."""
+    if known is None:
+        return f"<p class='quiet'>{escape(domain)} does not list the options that it takes.</p>"
+    if not known:
+        return f"<p class='quiet'>{escape(domain)} takes none.</p>"
+    said = ", ".join(f"<b>{escape(name)}</b>{_default(value)}" for name, value in known.items())
+    return f"<p class='quiet'>{escape(domain)} takes {said}.</p>"
+
+
+def _default(value: object) -> str:
+    """What an option is where nobody says, if that says anything."""
+    plain = isinstance(value, str | bool | int | float)
+    return f" ({escape(value if isinstance(value, str) else json.dumps(value))})" if plain and value != "" else ""
 
 
 def message(text: str) -> str:

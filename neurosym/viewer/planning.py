@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import logging
 import threading
 import time
@@ -129,6 +130,23 @@ class Planning:
         return self._stop.is_set()
 
 
+def maker_of(domain: str, given: Mapping[str, Maker]) -> Maker:
+    """What makes a domain's problems: of a number and options, or of options alone where the command line gave it.
+
+    Raises:
+        UnknownNameError: no such domain.
+    """
+    return given[domain] if domain in given else load_domain(domain).problem
+
+
+def options_of(make: Maker) -> dict[str, Any] | None:
+    """The options that problems take, with their defaults (`inspect.Parameter.empty` for none); None: any."""
+    parameters = inspect.signature(make).parameters.values()
+    if any(p.kind is p.VAR_KEYWORD for p in parameters):
+        return None
+    return {p.name: p.default for p in parameters if p.kind is p.KEYWORD_ONLY}
+
+
 def problem_maker(query: Query, given: Mapping[str, Maker]) -> Callable[[], Problem]:
     """A function that makes the problem of a query.
 
@@ -136,21 +154,24 @@ def problem_maker(query: Query, given: Mapping[str, Maker]) -> Callable[[], Prob
         given: what the command line was given, by the name it bears on the page.
 
     Raises:
-        InputError: no such domain, or no number where one is needed.
+        InputError: no such domain, no number where one is needed, or an option that the domain does not take.
     """
-    if query.domain in given:
-        make, what = given[query.domain], query.domain
-    else:
-        family, number = load_domain(query.domain), query.number
-        if number is None:
+    make = maker_of(query.domain, given)
+    known = options_of(make)
+    wrong = [] if known is None else [name for name in query.options if name not in known]
+    if known is not None and wrong:
+        takes = f"options of {query.domain!r} among {', '.join(known)}" if known else f"no option for {query.domain!r}"
+        raise InputError(f"Expected {takes}; got {', '.join(wrong)}.")
+    if query.domain not in given:
+        if query.number is None:
             raise InputError(f"Expected the number of a problem of {query.domain!r}; got none.")
-        make, what = partial(family.problem, number), f"a problem of {query.domain!r}"
+        make = partial(make, query.number)
 
     def problem() -> Problem:
         try:
             return make(**query.options)
         except TypeError as error:
-            raise InputError(f"Expected options that {what} takes; {error}.") from None
+            raise InputError(f"Expected options that {query.domain!r} takes; {error}.") from None
 
     return problem
 

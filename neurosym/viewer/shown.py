@@ -15,6 +15,7 @@ from neurosym.motions import stage
 from neurosym.pipeline import advice
 from neurosym.planner import PlanResult, Refusal, Status
 from neurosym.prior import OrderScores
+from neurosym.problem import Step
 from neurosym.viewer.timeline import Timeline
 
 if TYPE_CHECKING:
@@ -149,7 +150,8 @@ class Shown:
         """Stage the film and take the pictures, as far as the problem has them."""
         timeline, pictures = None, None
         try:
-            timeline = Timeline(stage(problem, search.steps, search.how))
+            how = search.how or _ways(problem, search)
+            timeline = Timeline(stage(problem, search.steps, how))
         except REFUSED as error:
             notes = (*notes, f"There is nothing to show in space: {error}")
         try:
@@ -167,3 +169,23 @@ class Shown:
         except REFUSED as error:
             notes.append(f"The prior's scores are not shown: {error}")
         return cls.of(saved.problem, Search.saved(saved, scores), tuple(notes))
+
+
+def _ways(problem: Problem, search: Search) -> tuple[Any, ...]:
+    """How the steps of a prefix are done, which a search without a plan does not say: each is asked for once more.
+
+    Nothing where one is refused: another oracle than geometry may have allowed it.
+    """
+    if search.solved:
+        return ()
+    grounded, found = problem.ground(), []
+    state = grounded.initial
+    for name in search.steps:
+        if name not in grounded.actions:
+            return ()
+        step = grounded.attempt(state, grounded.actions.index(name))
+        if not isinstance(step, Step):
+            return ()
+        state = step.state
+        found.append(step.how)
+    return tuple(found)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import partial, wraps
 from pathlib import Path
 from typing import Any
 
@@ -112,6 +112,7 @@ def _plan_at(path: Path, query: Query) -> Source:
 
 
 def _again(document: Mapping[str, Any], path: Path) -> Maker:
+    @wraps(load_domain(document["domain"]).problem)  # whose options it takes
     def make(**options: Any) -> Problem:
         return problem_of({**document, "options": options}, path)
 
@@ -121,6 +122,7 @@ def _again(document: Mapping[str, Any], path: Path) -> Maker:
 def _assembly_at(path: Path, query: Query, reading: Reading) -> Source:
     family, called = load_domain(ASSEMBLY), path.resolve().name
 
+    @wraps(family.problem)  # whose options it takes
     def make(**options: Any) -> Problem:
         return family.problem(reading.load(path), **{"name": called, **options})
 
