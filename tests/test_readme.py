@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -51,3 +52,56 @@ def test_links_of_the_readme_lead_somewhere(readme):
     for target in re.findall(r"\]\(([^)#]+)\)", readme):
         if not target.startswith("http"):
             assert (ROOT / target).exists(), target
+
+
+def cells(report, section, row):
+    """The cells of the first row of a report's section that begins as said."""
+    text = (ROOT / "docs" / report).read_text(encoding="utf-8").split(f"## {section}\n", 1)[1]
+    found = next(line for line in text.splitlines() if line.startswith(f"| {row} |"))
+    return [cell.strip() for cell in found.split("|")[1:-1]]
+
+
+def test_the_numbers_on_the_first_screen_are_those_of_the_reports(readme):
+    clean = [
+        cells("soma.md", "clean pictures", name)[1].split()[0] for name in ("sinkhorn", "sinkhorn-paper", "random")
+    ]
+    assert clean == ["1.0", "29.0", "94.3"]
+    assert "over five splits 1.0, 29.0 and 94.3%" in readme
+    for row, share in (("sinkhorn", "0.8"), ("sinkhorn-paper", "22.5"), ("none", "90.8")):
+        assert re.search(rf"^\| swap-repair \| {row} \| 120/120 \| {share} \|", readme, re.MULTILINE), row
+
+
+def test_the_small_table_is_that_of_the_results(readme):
+    """Whole sequences: in the tables of the towers that were seen, and that were not; of heights; and of words."""
+    where = (
+        ("tower: hard pictures", 200, 3),
+        ("tower: hard pictures", 200, 4),
+        ("variable: hard pictures", 400, 2),
+        ("scrabble: easy pictures", 98, 2),
+    )
+    for label, method in (
+        ("the best of the paper's methods, here", "tcn-paper+hungarian"),
+        ("`sinkhorn`, ours", "sinkhorn"),
+    ):
+        shown = re.search(rf"^\| {re.escape(label)} \|(.*)\|$", readme, re.MULTILINE).group(1).split("|")
+        for cell, (section, n, column) in zip(shown, where, strict=True):
+            value = float(cells("results.md", section, f"{n} | {method}")[column].split()[0])
+            cell = cell.strip()
+            decimals = len(cell.partition(".")[2])
+            assert f"{value:.{decimals}f}".lstrip("0") == cell, (label, section)
+
+
+def test_where_both_were_trained_the_papers_network_is_behind(readme):
+    """As the README says: Gumbel-Sinkhorn against the temporal network with the Hungarian algorithm."""
+    assert "`sinkhorn-paper` is behind `tcn-paper+hungarian` wherever both were trained" in readme
+    rows = re.findall(
+        r"^\| (\d+) \| (sinkhorn-paper|tcn-paper\+hungarian) \| ([\d.]+)",
+        (ROOT / "docs" / "results.md").read_text(encoding="utf-8"),
+        re.MULTILINE,
+    )
+    compared = 0
+    for (n, first, ahead), (m, second, behind) in pairwise(rows):
+        if n == m and (first, second) == ("tcn-paper+hungarian", "sinkhorn-paper"):
+            assert float(behind) < float(ahead), (n, ahead, behind)
+            compared += 1
+    assert compared >= 10
