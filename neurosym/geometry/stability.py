@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from neurosym.geometry.blocking import bits
 from neurosym.geometry.contacts import TABLE
 from neurosym.geometry.equilibrium import BALANCE, CONE_EDGES, QUICK, THOROUGH, Balance, Equilibrium
+from neurosym.geometry.holding import parts_to_hold
 from neurosym.geometry.patches import masses, merged_patches
 from neurosym.geometry.stability_program import solve_program
 
@@ -116,9 +117,6 @@ class Stability:
     def standing_when_held(self, subset: int, most: int, *, hands: int = -1) -> Standing:
         """Whether the parts in a bitset stand when the right ones, `most` of them at the most, are held.
 
-        Holding helps only against a motion in which the held part moves. So where a subset falls, one of the parts that
-        move is held, and the question is asked again: a search for a set that hits every motion.
-
         Args:
             subset: bitset of the parts that are there.
             most: how many may be held.
@@ -129,29 +127,9 @@ class Stability:
             presence is enough for the subset and any smaller one to fall.
         """
         hands &= subset & ~self.assembly.fixed_mask
-        motions: list[int] = []
-
-        def search(held: int, left: int, barred: int) -> int | None:
-            while True:
-                missed = [m & hands & ~barred for m in motions if not m & held]
-                if not missed:
-                    answer = self.standing(subset, held)
-                    if answer.stands:
-                        return held
-                    motions.append(answer.moving)
-                    continue
-                if not left:
-                    return None
-                for part in bits(min(missed, key=int.bit_count)):
-                    found = search(held | 1 << part, left - 1, barred)
-                    if found is not None:
-                        return found
-                    barred |= 1 << part
-                return None
-
-        found = search(0, most, 0)
-        if found is not None:
-            return Standing(True, 0, found)
+        held, motions = parts_to_hold(lambda held: self.standing(subset, held), hands, most)
+        if held is not None:
+            return Standing(True, 0, held)
         return Standing(False, functools.reduce(int.__or__, motions, 0))
 
     def by_program(self, subset: int, held: int = 0) -> Standing:
@@ -201,7 +179,7 @@ class Stability:
                 return self._fell(subset, fallen, held)
             if steps is None:
                 break
-            balance = self.equilibrium.balance(question.parts, question.corners, weights, None, steps)
+            balance = self.equilibrium.balance(question.parts, question.corners, weights, balance.forces, steps)
         self.asked["program"] += 1
         return self.by_program(subset, held)
 
@@ -309,7 +287,7 @@ class Stability:
             if len(inner.parts) == len(question.parts):
                 break
             weights = self.equilibrium.weights[inner.parts]
-            steps = THOROUGH if len(inner.parts) <= SMALL else QUICK
+            steps = QUICK + THOROUGH if len(inner.parts) <= SMALL else QUICK
             if self.equilibrium.balance(inner.parts, inner.corners, weights, None, steps).stands is False:
                 return mask
         return sum(1 << int(p) for p in question.parts) if balance.stands is False else 0
