@@ -292,8 +292,21 @@ def test_learning_is_drawn_above_and_what_is_right_below():
     assert list(below.lines[0].get_ydata()) == [k / 10 for k in range(1, 10)]
     assert [line.get_linestyle() for line in above.lines] == [":", "-", ":", "-"]
     said = " | ".join(texts(figure))
-    for piece in ("nats a step", "held-out orders", "n = 24 demonstrations", "sinkhorn", "tcn", "epoch"):
+    for piece in ("nats a step", "held-out orders", "n = 24 demonstrations held out", "sinkhorn", "tcn", "epoch"):
         assert piece in said
+
+
+def test_losses_of_different_kinds_have_a_panel_each_and_the_legend_lies_on_no_curve():
+    epochs = [Epoch(k, 2.0 / k, 2.2 / k, k / 10) for k in range(1, 10)]
+    kinds = {"sinkhorn-paper": "squared error", "tcn": "loss (nats a step)"}
+    figure = learning_figure("Soma", dict.fromkeys(kinds, epochs), loss=kinds, trained=96, held_out=24)
+    assert [axis.get_ylabel() for axis in figure.axes[:2]] == list(kinds.values())
+    assert [len(axis.lines) for axis in figure.axes] == [2, 2, 2]
+    assert all(axis.get_legend() is None for axis in figure.axes)
+    assert all(axis.get_ylim()[0] <= 0 for axis in figure.axes)
+    assert "n = 96 demonstrations to learn from, 24 held out" in " ".join(texts(figure))
+    with pytest.raises(ns.InputError, match=r"name of each method's loss; got none of tcn"):
+        learning_figure("Soma", dict.fromkeys(kinds, epochs), loss={"sinkhorn-paper": "squared error"})
 
 
 def test_nothing_held_out_leaves_the_loss_alone():

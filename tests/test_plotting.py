@@ -11,8 +11,19 @@ from scipy.spatial.transform import Rotation
 import neurosym as ns
 from neurosym.benchmark import Comparison, Outcome, Run
 from neurosym.geometry.shapes import Body, Box, Part
+from neurosym.measures import Counts
 from neurosym.motions import Staging, building, stage
-from neurosym.plotting import COLOURS, COLUMN, exploded_figure, iterations_figure, save
+from neurosym.plotting import (
+    COLOURS,
+    COLUMN,
+    Curves,
+    classes_figure,
+    curves_figure,
+    exploded_figure,
+    iterations_figure,
+    repeats_figure,
+    save,
+)
 from neurosym.plotting.exploded import MOST_NAMED
 from neurosym.plotting.labels import PITCH, crosses, in_columns
 from neurosym.plotting.painter import Piece, back_to_front
@@ -324,3 +335,40 @@ def test_an_exploded_view_loads_no_simulator():
         "assert not {'pybullet', 'matplotlib.pyplot', 'torch'} & set(sys.modules)"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+# -- what methods do not hide from one another ----------------------------------------------------------------
+
+
+def counts_of(wrong):
+    """Two classes of two actions; `wrong` of four steps are read as the other class."""
+    wanted = np.array([[0, 1, 2, 3]] * 5)
+    read = wanted.copy()
+    read[0, :wrong] = (read[0, :wrong] + 2) % 4
+    pictures = np.zeros((5, 1, 1, 1, 3), np.uint8)
+    return Counts.of(read, ns.Demonstrations(pictures, wanted, ("a1", "a2", "b1", "b2"), classes=(0, 0, 1, 1)))
+
+
+def test_equal_shares_of_methods_stand_side_by_side():
+    same = counts_of(1)
+    axis = classes_figure("letters", {"tcn": same, "sinkhorn": same}).axes[0]
+    places = [tuple(x) for line in axis.lines for x in line.get_xydata().round(6)]
+    assert len(set(places)) == len(places) == 4
+    assert all(abs(x - round(x)) < 0.4 for x, _ in places)  # still at their own class
+
+
+def test_markers_at_both_ends_are_whole():
+    for axis in repeats_figure("letters", {"tcn": counts_of(1)}).axes:
+        low, high = axis.get_ylim()
+        values = np.concatenate([line.get_ydata() for line in axis.lines])
+        assert low < min(0, values.min())
+        assert high > 1.04 * values.max()
+
+
+def test_bands_are_explained_where_there_are_some():
+    def said(seeds):
+        panel = Curves("steps right", {"tcn": {10: [0.5] * seeds, 20: [0.7] * seeds}})
+        return " ".join(texts(curves_figure("tower", "demonstrations", [panel])))
+
+    assert "bands: least to greatest" in said(2)
+    assert "bands" not in said(1)

@@ -72,7 +72,11 @@ def curves_figure(
         axis.set_axisbelow(True)
         tidy(axis)
     _across(axes[-1], sizes, across, log)
-    figure.suptitle(title, fontsize=TITLE)
+    seeds = max(
+        (len(own) for panel in panels for values in panel.values.values() for own in values.values()), default=0
+    )
+    bands = "\nlines: means over seeds; bands: least to greatest" if seeds > 1 else ""
+    figure.suptitle(f"{title}{bands}", fontsize=TITLE)
     handles, labels = axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=2, fontsize=SMALL, frameon=False)
     return figure

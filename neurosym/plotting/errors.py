@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 #: The axis of errors ends there or above (%), so that no errors look like none.
 LEAST_TOP = 1.0
+#: How much of a class's width its methods share.
+DODGE = 0.7
 
 
 def classes_figure(title: str, counts: Mapping[str, Counts]) -> Figure:
@@ -29,7 +31,11 @@ def classes_figure(title: str, counts: Mapping[str, Counts]) -> Figure:
         total = own.confusion[:k].sum(axis=1)
         there = np.flatnonzero(total)
         wrong = 1 - own.confusion.diagonal()[:k][there] / total[there]
-        axis.plot(there, 100 * wrong, look.marker or ".", color=look.colour, ms=3.6, mew=0.4, mec="white", label=method)
+        # Side by side, or equal shares would hide one another.
+        beside = there + DODGE * (position - (len(counts) - 1) / 2) / len(counts)
+        axis.plot(
+            beside, 100 * wrong, look.marker or ".", color=look.colour, ms=3.6, mew=0.4, mec="white", label=method
+        )
     first = next(iter(counts.values()))
     names = [f"{label} ({n})" for label, n in zip(first.labels, first.members)]
     axis.set_xticks(range(len(names)), names, rotation=90)
@@ -66,7 +72,7 @@ def _finish(figure: Figure, axes: Sequence[Axes], title: str) -> None:
     for axis in axes:
         tidy(axis)
         top = max(axis.get_ylim()[1], LEAST_TOP)
-        axis.set_ylim(-0.04 * top, top)  # a marker at 0 is seen whole
+        axis.set_ylim(-0.05 * top, 1.05 * top)  # markers at both ends are seen whole
         axis.tick_params(axis="x", length=0)
     figure.suptitle(title, fontsize=TITLE)
     handles, labels = axes[0].get_legend_handles_labels()

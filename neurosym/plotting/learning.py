@@ -9,7 +9,6 @@ from neurosym.errors import InputError
 from neurosym.plotting.style import COLUMN, SMALL, TITLE, look_of, tidy
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 
@@ -30,66 +29,83 @@ class Epoch(Protocol):
 
 
 def learning_figure(
-    title: str, runs: Mapping[str, Sequence[Epoch]], *, loss: str = "loss (nats a step)", held_out: int | None = None
+    title: str,
+    runs: Mapping[str, Sequence[Epoch]],
+    *,
+    loss: str | Mapping[str, str] = "loss (nats a step)",
+    trained: int | None = None,
+    held_out: int | None = None,
 ) -> Figure:
     """Above the loss, dotted in training and full where held out; below the share of held-out orders that are right.
 
-    Where nothing was held out there is only the loss in training.
+    Where nothing was held out there is only the loss in training. Losses of different kinds have a panel each.
 
     Args:
         title: of the figure.
         runs: method -> its epochs in order, as a list gathers them with ``fit(progress=list.append)``.
-        loss: what the loss is, with its unit.
+        loss: what the loss is, with its unit: of all methods, or method -> of that one. Of the methods here, those with
+            the paper's loss (`sinkhorn-paper`) have squared errors, the others nats a step.
+        trained: from how many demonstrations was learned, for the title.
         held_out: how many demonstrations are held out, for the title.
 
     Raises:
-        InputError: nothing to draw.
+        InputError: nothing to draw, or a method without a name of its loss.
     """
     from matplotlib.figure import Figure
 
     if not any(len(epochs) for epochs in runs.values()):
         raise InputError("Expected at least one epoch to draw; got none.")
+    kinds = {method: loss if isinstance(loss, str) else loss.get(method, "") for method in runs}
+    if unnamed := [method for method, kind in kinds.items() if not kind]:
+        raise InputError(f"Expected the name of each method's loss; got none of {', '.join(unnamed)}.")
     measured = any(e.held_out_whole_order_accuracy is not None for epochs in runs.values() for e in epochs)
-    figure = Figure(figsize=(COLUMN, 3.0 if measured else 2.1), layout="constrained")
-    axes = figure.subplots(1 + measured, 1, sharex=True, squeeze=False)[:, 0]
+    panels = list(dict.fromkeys(kinds.values()))
+    rows = len(panels) + measured
+    figure = Figure(figsize=(COLUMN, 1.05 + 1.05 * rows), layout="constrained")
+    axes = figure.subplots(rows, 1, sharex=True, squeeze=False)[:, 0]
     for position, (method, epochs) in enumerate(runs.items()):
         look = look_of(method, position)
         every = max(1, len(epochs) // 8)
         line = {"color": look.colour, "lw": 1.2, "marker": look.marker, "ms": 3.5, "markevery": every}
-        axes[0].plot([e.epoch for e in epochs], [e.train_loss for e in epochs], ":", **line)
+        axis = axes[panels.index(kinds[method])]
+        axis.plot([e.epoch for e in epochs], [e.train_loss for e in epochs], ":", **line)
         losses = [(e.epoch, e.held_out_loss) for e in epochs]
         held = [(epoch, value) for epoch, value in losses if value is not None]
-        axes[0].plot([x for x, _ in held], [y for _, y in held], "-", **line)
+        axis.plot([x for x, _ in held], [y for _, y in held], "-", **line)
         if measured:
             shares = [(e.epoch, e.held_out_whole_order_accuracy) for e in epochs]
             right = [(epoch, value) for epoch, value in shares if value is not None]
-            axes[1].plot([x for x, _ in right], [y for _, y in right], "-", **line)
-    axes[0].set_ylabel(loss, fontsize=TITLE)
+            axes[-1].plot([x for x, _ in right], [y for _, y in right], "-", **line)
+    for axis, kind in zip(axes, panels):
+        axis.set_ylabel(kind, fontsize=TITLE)
+        low, high = axis.get_ylim()
+        axis.set_ylim(min(0.0, low), 1.05 * high if high > 0 else high)  # from 0 on: a small gain looks small
     if measured:
-        axes[1].set_ylabel("held-out orders\nright (share)", fontsize=TITLE)
-        axes[1].set_ylim(-0.03, 1.05)
-        axes[1].set_yticks([0, 0.5, 1], ["0", ".5", "1"])
+        axes[-1].set_ylabel("held-out orders\nright (share)", fontsize=TITLE)
+        axes[-1].set_ylim(-0.03, 1.05)
+        axes[-1].set_yticks([0, 0.5, 1], ["0", ".5", "1"])
     axes[-1].set_xlabel("epoch", fontsize=TITLE)
     for axis in axes:
         axis.grid(axis="y", color="0.9", lw=0.6)
         axis.set_axisbelow(True)
         tidy(axis)
-    said = f"\nn = {held_out} demonstrations held out" if held_out and measured else ""
-    figure.suptitle(f"{title}{said}", fontsize=TITLE)
-    _legends(figure, axes[0], list(runs), measured=measured)
+    said = [f"{trained:,} demonstrations to learn from"] if trained else []
+    said += [f"{held_out:,} {'' if said else 'demonstrations '}held out"] if held_out and measured else []
+    figure.suptitle(f"{title}\nn = {', '.join(said)}" if said else title, fontsize=TITLE)
+    _legend(figure, list(runs), measured=measured)
     return figure
 
 
-def _legends(figure: Figure, axis: Axes, methods: Sequence[str], *, measured: bool) -> None:
+def _legend(figure: Figure, methods: Sequence[str], *, measured: bool) -> None:
+    """Below all panels, where it lies on no curve."""
     from matplotlib.lines import Line2D
 
-    kinds = [Line2D([], [], ls=":", color="0.3", lw=1.2, label="in training")]
-    if measured:
-        kinds.append(Line2D([], [], ls="-", color="0.3", lw=1.2, label="held out"))
-    axis.legend(handles=kinds, fontsize=SMALL, frameon=False, loc="upper right")
     looks = [look_of(method, position) for position, method in enumerate(methods)]
     handles = [
         Line2D([], [], color=look.colour, lw=1.2, marker=look.marker, ms=3.5, label=method)
         for look, method in zip(looks, methods)
     ]
+    handles.append(Line2D([], [], ls=":", color="0.3", lw=1.2, label="in training"))
+    if measured:
+        handles.append(Line2D([], [], ls="-", color="0.3", lw=1.2, label="held out"))
     figure.legend(handles=handles, loc="outside lower center", ncols=3, fontsize=SMALL, frameon=False)
