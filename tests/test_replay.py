@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
+import shutil
+import subprocess
+import time
 from itertools import pairwise
 from pathlib import Path
 
@@ -11,12 +15,13 @@ import pytest
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from PIL import ImageGrab
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 import neurosym as ns
 from neurosym.cli import main
-from neurosym.errors import InputError, UnknownNameError
+from neurosym.errors import InputError, NeurosymError, UnknownNameError
 from neurosym.geometry.assembly import Body, Box, Mesh, Part
 from neurosym.motions import Motion, Staging, building, pose_along, stage, steps_in_space
 from neurosym.plan_files import read_plan
@@ -24,6 +29,7 @@ from neurosym.simulation import World, open_clients, replay_plan, replay_staging
 from neurosym.simulation.cutting import cut_into_convex
 from neurosym.simulation.decomposition import convex_pieces
 from neurosym.simulation.solids import rigid_bodies
+from neurosym.simulation.world_window import WorldWindow
 from neurosym.ways import Way
 
 BEAM = {"post": [(0, 0, 0)], "beam": [(0, 0, 1), (1, 0, 1)], "weight": [(0, 0, 2)]}
@@ -374,6 +380,9 @@ def test_files_that_are_no_json_are_refused(tmp_path, text, capfd):
     assert "Expected" in capfd.readouterr().err
 
 
+# -- the window -------------------------------------------------------------------------------------------------
+
+
 def test_a_window_without_a_screen_is_refused_and_ends_nothing(plan_file, monkeypatch, capfd):
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.setattr("sys.platform", "linux")
@@ -381,3 +390,59 @@ def test_a_window_without_a_screen_is_refused_and_ends_nothing(plan_file, monkey
     assert call("replay", plan_file, "--gui") == 33
     assert "Expected a screen" in capfd.readouterr().err
     assert open_clients() == before
+
+
+def test_a_screen_that_does_not_answer_is_refused_in_our_words(plan_file, monkeypatch, capfd):
+    monkeypatch.setenv("DISPLAY", ":40931")
+    before = open_clients()
+    assert call("replay", plan_file, "--gui", "--json") == 33
+    said = capfd.readouterr()
+    assert "Expected PyBullet's window to open" in said.err
+    assert said.out == ""
+    assert open_clients() == before
+
+
+@pytest.fixture
+def screen(monkeypatch):
+    """A virtual screen; DISPLAY names it."""
+    if shutil.which("Xvfb") is None:
+        pytest.skip("Xvfb is not installed")
+    mine, its = os.pipe()
+    command = ["Xvfb", "-displayfd", str(its), "-screen", "0", "1024x768x24"]
+    server = subprocess.Popen(command, pass_fds=[its], stderr=subprocess.DEVNULL)
+    os.close(its)
+    try:
+        with os.fdopen(mine) as answer:
+            monkeypatch.setenv("DISPLAY", f":{answer.readline().strip()}")
+        yield os.environ["DISPLAY"]
+    finally:
+        server.terminate()
+        server.wait()
+
+
+def test_a_window_shows_parts_in_their_colours_in_real_time_until_it_is_closed(screen):
+    assembly = ns.Assembly.from_cells({"low": [(0, 0, 0)], "high": [(0, 0, 1)]})
+    staging = Staging(assembly, ("low",), (), {"low": (0.9, 0.0, 0.0), "high": (0.0, 0.0, 0.9)})
+    with World(assembly, present=["low"]) as world:
+        try:
+            window = WorldWindow(world, staging)
+        except NeurosymError:
+            pytest.skip("no OpenGL on the virtual screen")
+        with window:
+            start = time.monotonic()
+            for _ in range(240):
+                world.step()
+                window.tick()
+            assert time.monotonic() - start > 0.9, "a second takes a second"
+            seen = np.asarray(ImageGrab.grab(xdisplay=screen)).astype(int)
+            red, blue = (seen[:, :, c] > 90 + seen.max(axis=2, where=np.arange(3) != c, initial=0) for c in (0, 2))
+            assert red.sum() > 2000
+            assert not blue.any(), "what is not there is not seen"
+            middle = np.argwhere(red).mean(axis=0) / (768, 1024)
+            assert ((middle > 0.3) & (middle < 0.8)).all(), middle
+            window.close()
+            assert not window.is_open
+            start = time.monotonic()
+            for _ in range(240):
+                window.tick()
+            assert time.monotonic() - start < 0.5, "nobody looks any more"

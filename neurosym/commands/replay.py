@@ -12,7 +12,7 @@ from neurosym.commands.common import AsJson, console, print_json, write_json
 from neurosym.exit_codes import UNWELL
 
 if TYPE_CHECKING:
-    from neurosym.simulation.replay import ReplayReport
+    from neurosym.simulation.replay_report import ReplayReport
 
 
 class Bodies(StrEnum):

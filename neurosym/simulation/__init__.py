@@ -9,21 +9,25 @@ if TYPE_CHECKING:
     from neurosym.simulation.client import Client, open_clients
     from neurosym.simulation.looks import STYLES, VIEWS, Camera, Style
     from neurosym.simulation.oracle import PhysicsOracle
+    from neurosym.simulation.physics import Physics
     from neurosym.simulation.picture_cache import cached_pictures
     from neurosym.simulation.render import PictureStudio, render_many, render_views
-    from neurosym.simulation.replay import ReplayReport, StepReplay, replay_plan, replay_staging
+    from neurosym.simulation.replay import replay_plan, replay_staging
+    from neurosym.simulation.replay_report import ReplayReport, StepReplay
     from neurosym.simulation.scene import PALETTE
-    from neurosym.simulation.world import Physics, World, stands
+    from neurosym.simulation.world import World, stands
 
 _HOME = {
     "client": ("Client", "open_clients"),
     "looks": ("STYLES", "VIEWS", "Camera", "Style"),
     "oracle": ("PhysicsOracle",),
+    "physics": ("Physics",),
     "picture_cache": ("cached_pictures",),
     "render": ("PictureStudio", "render_many", "render_views"),
-    "replay": ("ReplayReport", "StepReplay", "replay_plan", "replay_staging"),
+    "replay": ("replay_plan", "replay_staging"),
+    "replay_report": ("ReplayReport", "StepReplay"),
     "scene": ("PALETTE",),
-    "world": ("Physics", "World", "stands"),
+    "world": ("World", "stands"),
 }
 
 __all__ = [

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from neurosym.motions import Motion
+from neurosym.simulation.physics import BodyKey
 from neurosym.simulation.solids import matrix, quaternion
-from neurosym.simulation.world import BodyKey, World
+from neurosym.simulation.world import World
 
 Array = NDArray[np.float64]
 #: Position and quaternion (x, y, z, w) of a body's centre-of-mass frame, in the scene's scale.

@@ -2,14 +2,13 @@
 
 PyBullet prints a banner from C when it is imported, past `sys.stdout` and `sys.stderr`. It is imported here,
 once, with the process's own file descriptors turned aside, and whatever other threads wrote meanwhile is
-passed on. A `Client` is one connection (``DIRECT``, no window and no server, unless a window is asked for) that closes
+passed on. A `Client` is one connection (``DIRECT``, no window and no server) that closes
 when it is left, when an exception passes, when it is forgotten and when Python ends.
 """
 
 from __future__ import annotations
 
 import contextlib
-import ctypes.util
 import importlib
 import os
 import sys
@@ -94,26 +93,19 @@ def pybullet() -> Any:
 
 
 class Client:
-    """One connection to a simulator of its own, without a window unless one is asked for.
+    """One connection to a simulator of its own, without a window (`neurosym.simulation.window` has one).
 
     Use it as a context manager, or call `close`. Attribute `p` is the `pybullet` module and `id` what its
     functions want as ``physicsClientId``.
 
-    Args:
-        window: show the simulation in PyBullet's own window; one at a time.
-
     Raises:
-        NeurosymError: PyBullet has no connection left (it allows about a thousand at a time), or has no screen.
+        NeurosymError: PyBullet has no connection left (it allows about a thousand at a time).
     """
 
-    def __init__(self, *, window: bool = False) -> None:
+    def __init__(self) -> None:
         self.p = pybullet()
-        if window and not _has_screen():
-            raise NeurosymError("Expected a screen for PyBullet's window; there is none. Leave the window out (--gui).")
         with _lock, _without_banner():
-            self.id: int = self.p.connect(self.p.GUI if window else self.p.DIRECT)
-        if window and self.id >= 0:
-            self.p.configureDebugVisualizer(self.p.COV_ENABLE_GUI, 0, physicsClientId=self.id)
+            self.id: int = self.p.connect(self.p.DIRECT)
         if self.id < 0:
             raise NeurosymError(
                 "Expected a connection to PyBullet; it has none left. Close worlds and studios after use ('with')."
@@ -136,23 +128,6 @@ class Client:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
-
-
-def _has_screen() -> bool:
-    """Whether a window can open. Without an X server PyBullet would end the whole process."""
-    if not sys.platform.startswith("linux"):
-        return True
-    library = ctypes.util.find_library("X11")
-    if library is None or not os.environ.get("DISPLAY"):
-        return False
-    x11 = ctypes.CDLL(library)
-    x11.XOpenDisplay.restype = ctypes.c_void_p
-    x11.XCloseDisplay.argtypes = [ctypes.c_void_p]
-    display = x11.XOpenDisplay(None)
-    if not display:
-        return False
-    x11.XCloseDisplay(display)
-    return True
 
 
 def open_clients() -> int:

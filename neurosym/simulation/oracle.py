@@ -17,7 +17,8 @@ import numpy as np
 from neurosym.errors import InputError
 from neurosym.geometry.assembly import Assembly
 from neurosym.problem import Rejection, Step
-from neurosym.simulation.world import MOVED_SHARE, SETTLE_STEPS, Physics, Snapshot, World
+from neurosym.simulation.physics import MOVED_SHARE, SETTLE_STEPS, Physics, Snapshot
+from neurosym.simulation.world import World
 from neurosym.words import joined
 
 #: The state of a problem under physics: the symbols, and the actions done so far, in order.

@@ -15,10 +15,8 @@ part collides exactly as it is.
 
 from __future__ import annotations
 
-import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -26,8 +24,10 @@ import numpy as np
 from neurosym.motions import Motion, Staging, stage
 from neurosym.simulation.carrying import Carrier, hold
 from neurosym.simulation.oracle import COLLAPSE_CUBES, CUBES_CLEARANCE
-from neurosym.simulation.scene import part_colours
-from neurosym.simulation.world import MOVED_SHARE, SETTLE_STEPS, Physics, Snapshot, World
+from neurosym.simulation.physics import MOVED_SHARE, SETTLE_STEPS, Physics, Snapshot
+from neurosym.simulation.replay_report import ReplayReport, StepReplay, reason_of
+from neurosym.simulation.world import World
+from neurosym.simulation.world_window import WorldWindow
 from neurosym.words import joined
 
 if TYPE_CHECKING:
@@ -36,87 +36,6 @@ if TYPE_CHECKING:
 
 #: A pulled part that ends farther than this from its path's end, in typical bodies, was jammed.
 JAMMED_SHARE = 0.5
-
-
-@dataclass(frozen=True)
-class StepReplay:
-    """What one step did to the parts that stay.
-
-    Attributes:
-        action: name of the action.
-        parts: names of the parts that went, or came.
-        arrives: whether they came.
-        displacement: how far the farthest-moved corner of any part that stays went, in the assembly's length unit.
-        share: the same, as a share of the smallest part (the smallest extent of any part).
-        farthest: name of the part it belongs to; None when no part stays.
-        moved: the parts that moved by more than the threshold, with how far.
-        in_the_way: names of the parts that the path cuts into; of the moving parts themselves, where they were jammed.
-        stood_still: whether nothing was in the way and the rest stood still.
-        reason: one sentence.
-    """
-
-    action: str
-    parts: tuple[str, ...]
-    arrives: bool
-    displacement: float
-    share: float
-    farthest: str | None
-    moved: Mapping[str, float]
-    in_the_way: tuple[str, ...]
-    stood_still: bool
-    reason: str
-
-
-@dataclass(frozen=True)
-class ReplayReport:
-    """What a replay found. Truthy exactly when every step left the rest standing still.
-
-    Attributes:
-        start: displacements before the first step, of an assembly that stands by itself next to nothing.
-        steps: one a step of the plan, or up to the first failure where it was to stop there.
-        threshold: the displacement above which a part has moved, in the assembly's length unit.
-        smallest: the smallest extent of any part, same unit.
-        bodies: ``"rigid"`` or ``"cubes"``, see `replay_plan`.
-        pulled: whether parts were pulled along.
-    """
-
-    start: StepReplay
-    steps: tuple[StepReplay, ...]
-    threshold: float
-    smallest: float
-    bodies: str
-    pulled: bool
-
-    @property
-    def failed_at(self) -> int | None:
-        """Number of the first step (from 0) that did not leave the rest standing still; -1: it never stood; or None."""
-        if not self.start.stood_still:
-            return -1
-        return next((i for i, step in enumerate(self.steps) if not step.stood_still), None)
-
-    @property
-    def ok(self) -> bool:
-        return self.failed_at is None
-
-    def __bool__(self) -> bool:
-        return self.ok
-
-    def as_json(self) -> dict[str, Any]:
-        """Plain data, for a file."""
-        return {
-            "ok": self.ok,
-            "failed_at": self.failed_at,
-            "threshold": self.threshold,
-            "smallest_part": self.smallest,
-            "bodies": self.bodies,
-            "pulled": self.pulled,
-            "start": _step_json(self.start),
-            "steps": [_step_json(step) for step in self.steps],
-        }
-
-
-def _step_json(step: StepReplay) -> dict[str, Any]:
-    return {**vars(step), "parts": list(step.parts), "moved": dict(step.moved), "in_the_way": list(step.in_the_way)}
 
 
 def replay_plan(
@@ -145,13 +64,13 @@ def replay_plan(
         threshold: a part has moved when a corner of it did by more, in the assembly's length unit; None means
             `MOVED_SHARE` of a typical body.
         stop_at_failure: leave out the steps after the first that fails.
-        window: show it in PyBullet's own window, in real time.
+        window: show it in PyBullet's own window, in real time; whoever looks may close it, which ends nothing else.
 
     A problem that was planned without gravity is replayed without.
 
     Raises:
         InputError: a plan, a `how` or an assembly that cannot be simulated.
-        NeurosymError: no screen for the window.
+        NeurosymError: no screen for the window, or no OpenGL.
     """
     rule = bodies or (problem.simulation.bodies if problem.simulation is not None else "rigid")
     physics = Physics(
@@ -187,15 +106,18 @@ def replay_staging(
 
     The others are those of `replay_plan`.
     """
-    with World(
-        staging.assembly,
-        bodies="cubes" if bodies == "cubes" else "parts",
-        physics=physics,
-        present=staging.present,
-        meshes="decompose",
-        window=window,
-    ) as world:
-        run = _Run(world, staging, bodies == "cubes", pulled, threshold, window)
+    with ExitStack() as stack:
+        world = stack.enter_context(
+            World(
+                staging.assembly,
+                bodies="cubes" if bodies == "cubes" else "parts",
+                physics=physics,
+                present=staging.present,
+                meshes="decompose",
+            )
+        )
+        shown = stack.enter_context(WorldWindow(world, staging)) if window else None
+        run = _Run(world, staging, bodies == "cubes", pulled, threshold, shown)
         start = run.start()
         steps: list[StepReplay] = []
         for motion in staging.motions:
@@ -209,13 +131,17 @@ class _Run:
     """One replay under way."""
 
     def __init__(
-        self, world: World, staging: Staging, cubes: bool, pulled: bool, threshold: float | None, window: bool
+        self,
+        world: World,
+        staging: Staging,
+        cubes: bool,
+        pulled: bool,
+        threshold: float | None,
+        window: WorldWindow | None,
     ) -> None:
         self.world, self.cubes, self.pulled, self.window = world, cubes, pulled and not cubes, window
         self.threshold = MOVED_SHARE * world.unit if threshold is None else threshold
         self.smallest = smallest_part(staging.assembly)
-        self._colours = part_colours(staging)
-        self._paint()
 
     def start(self) -> StepReplay:
         """Let everything settle before the first step."""
@@ -229,7 +155,6 @@ class _Run:
         there = {part for part, _ in world.bodies}
         if motion.arrives:
             world.add(*(name for name in motion.parts if name not in there))
-            self._paint()
         elif not there & set(motion.parts):
             # A sub-assembly that left as a whole is taken apart where nothing rests on it.
             said = f"{joined(motion.parts)} left before, with others: taken from them in the hand."
@@ -275,13 +200,8 @@ class _Run:
             self._show()
 
     def _show(self) -> None:
-        if self.window:
-            time.sleep(self.world.physics.time_step)
-
-    def _paint(self) -> None:
-        if self.window:
-            for part, colour in self._colours.items():
-                self.world.paint(part, colour)
+        if self.window is not None:
+            self.window.tick()
 
     def _judged(self, motion: Motion, before: Snapshot, blocked: tuple[str, ...]) -> StepReplay:
         """What moved since `before`; what has arrived is to stand too."""
@@ -294,34 +214,12 @@ class _Run:
         count = sum(d > self.threshold for far in moved_bodies.values() for d in far)
         stood = not blocked and count <= (COLLAPSE_CUBES if self.cubes else 0)
         share = distance / self.smallest
-        reason = _reason(motion, moved, blocked, distance, share, farthest)
+        reason = reason_of(motion, moved, blocked, distance, share, farthest)
         if moved and stood:
             reason += " One cube alone may fall, by this rule."
         return StepReplay(
             motion.action, motion.parts, motion.arrives, distance, share, farthest, moved, blocked, stood, reason
         )
-
-
-def _reason(
-    motion: Motion,
-    moved: Mapping[str, float],
-    blocked: tuple[str, ...],
-    distance: float,
-    share: float,
-    farthest: str | None,
-) -> str:
-    said = []
-    if blocked and set(blocked) == set(motion.parts):
-        said.append(f"{joined(blocked)} jammed on the way.")
-    elif blocked:
-        said.append(f"{joined(blocked)} {'is' if len(blocked) == 1 else 'are'} in the way of {joined(motion.parts)}.")
-    if moved:
-        said.append("Moved: " + joined([f"{part} by {far:.3g}" for part, far in moved.items()]) + ".")
-    elif farthest is None:
-        said.append("Nothing is left.")
-    elif not said:
-        said.append(f"The rest stood still; {farthest} moved by {distance:.2g}, {share:.2%} of the smallest part.")
-    return " ".join(said)
 
 
 def smallest_part(assembly: Assembly) -> float:

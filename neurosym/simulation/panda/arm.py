@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from neurosym.simulation.client import Client
 from neurosym.simulation.solids import matrix, quaternion
+from neurosym.simulation.window import Shown
 
 Array = NDArray[np.float64]
 
@@ -82,6 +83,25 @@ class PandaArm:
         """float64 (4, 4): pose of the tool, the point between the fingertips; its z points where the fingers do."""
         state = self._p.getLinkState(self.body, TOOL, computeForwardKinematics=True, physicsClientId=self._c)
         return matrix(state[4], state[5])
+
+    def looks(self) -> list[tuple[int, Shown]]:
+        """The numbers of the links that can be seen (-1 is the base), and what they look like."""
+        found = []
+        for _, link, kind, _, file, at, turn, rgba, *_ in self._p.getVisualShapeData(
+            self.body, physicsClientId=self._c
+        ):
+            if kind == self._p.GEOM_MESH:
+                found.append((int(link), Shown(tuple(rgba[:3]), mesh=(file.decode(), at, turn))))
+        return found
+
+    def frame(self, link: int) -> tuple[float, ...]:
+        """Position and quaternion (x, y, z, w) of a link now, seven numbers."""
+        if link < 0:
+            at, turn = self._p.getBasePositionAndOrientation(self.body, physicsClientId=self._c)
+        else:
+            state = self._p.getLinkState(self.body, link, computeForwardKinematics=True, physicsClientId=self._c)
+            at, turn = state[4], state[5]
+        return (*at, *turn)
 
     def put(self, q: Array, width: float | None = None) -> None:
         """Set the joints, and the fingers, at once and at rest: for thinking, not for acting."""

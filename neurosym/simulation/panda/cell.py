@@ -5,8 +5,7 @@ Everything is at its true size in metres, at 1/240 s a step. The table is the pl
 
 from __future__ import annotations
 
-import time
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from types import TracebackType
 from typing import Any
@@ -28,6 +27,10 @@ SOLVER_ITERATIONS = 150
 DENSITY = 680.0
 #: Free space that a planned motion keeps (metres): of arm and load to blocks, and to the table.
 MARGIN, TABLE_MARGIN = 0.006, 0.002
+#: Middle of the table top that is drawn (metres).
+_TABLE = (0.3, 0.0, -0.0101)
+#: Of blocks without a colour of their own.
+_WOOD: RGB = (0.8, 0.7, 0.5)
 
 
 @dataclass(frozen=True)
@@ -45,8 +48,10 @@ class Cell:
         sizes: name of a block -> float64 (3,), its edges.
         poses: name of a block -> float64 (4, 4), where it lies at first.
         friction: between any two blocks, and of blocks on the table.
-        colours: name of a block -> RGB in 0..1, for a window and pictures.
-        window: show it, in real time.
+        colours: name of a block -> RGB in 0..1, for those who watch.
+
+    Attributes:
+        watchers: called with the cell after each time step.
     """
 
     def __init__(
@@ -56,20 +61,20 @@ class Cell:
         *,
         friction: float = 0.5,
         colours: Mapping[str, RGB] | None = None,
-        window: bool = False,
     ) -> None:
         self.sizes = dict(sizes)
-        self.window = window
-        self.client = Client(window=window)
+        self.colours = {name: (colours or {}).get(name, _WOOD) for name in sizes}
+        self.watchers: list[Callable[[Cell], None]] = []
+        self.client = Client()
         self._p: Any = self.client.p
         self._c = self.client.id
         try:
-            self._build(poses, friction, colours or {})
+            self._build(poses, friction)
         except BaseException:
             self.close()
             raise
 
-    def _build(self, poses: Mapping[str, Array], friction: float, colours: Mapping[str, RGB]) -> None:
+    def _build(self, poses: Mapping[str, Array], friction: float) -> None:
         p, c = self._p, self._c
         p.setGravity(0, 0, -9.81, physicsClientId=c)
         p.setPhysicsEngineParameter(
@@ -79,7 +84,12 @@ class Cell:
             physicsClientId=c,
         )
         plane = p.createCollisionShape(p.GEOM_PLANE, physicsClientId=c)
-        self._table = p.createMultiBody(0, plane, physicsClientId=c)
+        # Only looks: the table is the whole plane.
+        half = [0.45, 0.55, 0.01]
+        slab = p.createVisualShape(
+            p.GEOM_BOX, halfExtents=half, visualFramePosition=_TABLE, rgbaColor=[0.87, 0.87, 0.84, 1], physicsClientId=c
+        )
+        self._table = p.createMultiBody(0, plane, slab, physicsClientId=c)
         surface = float(np.sqrt(friction))
         p.changeDynamics(self._table, -1, lateralFriction=surface, physicsClientId=c)
         self.arm = PandaArm(self.client)
@@ -87,14 +97,12 @@ class Cell:
         for name, size in self.sizes.items():
             half = (size / 2).tolist()
             shape = p.createCollisionShape(p.GEOM_BOX, halfExtents=half, physicsClientId=c)
-            rgba = [*colours.get(name, (0.8, 0.7, 0.5)), 1.0]
+            rgba = [*self.colours[name], 1.0]
             visual = p.createVisualShape(p.GEOM_BOX, halfExtents=half, rgbaColor=rgba, physicsClientId=c)
             number = p.createMultiBody(DENSITY * float(np.prod(size)), shape, visual, physicsClientId=c)
             p.changeDynamics(number, -1, lateralFriction=surface, spinningFriction=0.001, physicsClientId=c)
             self._blocks[name] = number
             self.put(name, poses[name])
-        if self.window:
-            p.resetDebugVisualizerCamera(1.2, 50, -25, (0.4, 0, 0.15), physicsClientId=c)
 
     def close(self) -> None:
         """Close the simulator; closing twice does nothing."""
@@ -112,6 +120,12 @@ class Cell:
         """float64 (4, 4): where a block lies now."""
         return matrix(*self._p.getBasePositionAndOrientation(self._blocks[block], physicsClientId=self._c))
 
+    def frames(self) -> dict[str, tuple[float, ...]]:
+        """Position and quaternion (x, y, z, w) of each block now, seven numbers."""
+        p, c = self._p, self._c
+        frames = {n: p.getBasePositionAndOrientation(i, physicsClientId=c) for n, i in self._blocks.items()}
+        return {name: (*at, *turn) for name, (at, turn) in frames.items()}
+
     def put(self, block: str, X: Array) -> None:
         """Set a block's pose at once."""
         turn = quaternion(X[:3, :3]).tolist()
@@ -122,8 +136,8 @@ class Cell:
         """Let time pass."""
         for _ in range(steps):
             self._p.stepSimulation(physicsClientId=self._c)
-            if self.window:
-                time.sleep(TIME_STEP)
+            for watcher in self.watchers:
+                watcher(self)
 
     def pinched(self, block: str) -> bool:
         """Whether both fingers touch a block now."""

@@ -1,0 +1,112 @@
+"""Watching the arm at work: in a window, or as a film."""
+
+from __future__ import annotations
+
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from neurosym.simulation.film_files import RATE
+from neurosym.simulation.looks import Camera, aimed
+from neurosym.simulation.panda.cell import TIME_STEP, Cell
+from neurosym.simulation.shading import LIGHT
+from neurosym.simulation.window import Shown, Window
+
+Array = NDArray[np.float64]
+Picture = NDArray[np.uint8]
+
+#: From where the arm is watched: opposite it, a little from its left.
+CAMERA = Camera(38, 24, field_of_view=30.0)
+#: What is to be in view: the arm, and the table where blocks lie (metres).
+_LOW, _HIGH = np.array([-0.1, -0.42, 0.0]), np.array([0.72, 0.42, 0.72])
+ROOM = np.array(np.meshgrid(*zip(_LOW, _HIGH))).reshape(3, -1).T
+#: Drawn so many times larger, along each axis, than it is handed out.
+_OVERSAMPLING = 2
+
+
+class CellWindow:
+    """Shows a cell in a window, in real time (a context manager).
+
+    Raises:
+        NeurosymError: there is no screen, or no OpenGL.
+    """
+
+    def __init__(self, cell: Cell) -> None:
+        self._cell = cell
+        arm = cell.arm.looks()
+        blocks = [Shown(cell.colours[name], triangles=_box(size)) for name, size in cell.sizes.items()]
+        self._links = [link for link, _ in arm]
+        self._window = Window([*(shown for _, shown in arm), *blocks], ROOM, CAMERA, 0.0)
+
+    def tick(self, cell: Cell) -> None:
+        """One time step has passed."""
+        self._window.advance(TIME_STEP, self._poses)
+
+    def __enter__(self) -> CellWindow:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if kind is None:
+            self._window.linger(self._poses)
+        self._window.close()
+
+    def _poses(self) -> Array:
+        return np.array([*(self._cell.arm.frame(link) for link in self._links), *self._cell.frames().values()])
+
+
+class CellFilm:
+    """Pictures of a cell while time passes, `RATE` of them a second of film; to be called after each time step.
+
+    Args:
+        size: width and height in pixels, even numbers.
+        speed: seconds that pass in a second of film.
+
+    Attributes:
+        pictures: uint8 (height, width, 3) each.
+    """
+
+    def __init__(self, size: tuple[int, int] = (640, 480), speed: float = 4.0) -> None:
+        self.size, self.pictures = size, list[Picture]()
+        self._every, self._steps = max(1, round(speed / RATE / TIME_STEP)), 0
+
+    def __call__(self, cell: Cell) -> None:
+        if self._steps % self._every == 0:
+            self.pictures.append(picture_of(cell, self.size))
+        self._steps += 1
+
+
+def picture_of(cell: Cell, size: tuple[int, int]) -> Picture:
+    """uint8 (height, width, 3): the cell as it is now, from `CAMERA`, without a window."""
+    from PIL import Image
+
+    p: Any = cell.client.p
+    large = (_OVERSAMPLING * size[0], _OVERSAMPLING * size[1])
+    view, projection, _ = aimed(ROOM, CAMERA, size)
+    image = p.getCameraImage(
+        *large,
+        view.T.ravel().tolist(),
+        projection.T.ravel().tolist(),
+        lightDirection=(10 * LIGHT).tolist(),
+        lightColor=(1, 1, 1),
+        lightDistance=3,
+        shadow=0,
+        lightAmbientCoeff=0.6,
+        lightDiffuseCoeff=0.42,
+        lightSpecularCoeff=0.0,
+        renderer=p.ER_TINY_RENDERER,
+        physicsClientId=cell.client.id,
+    )
+    colour = np.array(image[2], dtype=np.uint8).reshape(large[1], large[0], 4)[:, :, :3].copy()
+    colour[np.array(image[4]).reshape(large[1], large[0]) < 0] = 255
+    return np.asarray(Image.fromarray(colour).reduce(_OVERSAMPLING))
+
+
+def _box(size: Array) -> Array:
+    """float64 (12, 3, 3): the surface of a box around the origin."""
+    import trimesh
+
+    return np.asarray(trimesh.creation.box(size).triangles, dtype=np.float64)
