@@ -1,8 +1,12 @@
-"""How many scene updates a second the viewer makes with 184 parts: a cross vault, or boxes where it is absent."""
+"""How many scene updates a second the viewer makes with 184 parts: a cross vault, or boxes where it is absent.
+
+Another folder of parts in metres may be named as an argument.
+"""
 
 from __future__ import annotations
 
 import itertools
+import sys
 import time
 from pathlib import Path
 
@@ -18,7 +22,9 @@ VAULT = Path(__file__).parents[2] / "shared" / "data" / "crossvault"
 UPDATES = 400
 
 
-def vault() -> Assembly:
+def parts() -> Assembly:
+    if len(sys.argv) > 1:
+        return Assembly.load(sys.argv[1], units="m")
     if VAULT.exists():
         return Assembly.load(VAULT, units="m")
     cells = itertools.islice(itertools.product(range(8), range(6), range(4)), 184)
@@ -32,10 +38,12 @@ def rate(scene: PlanScene, times: np.ndarray) -> float:
     return len(times) / (time.perf_counter() - start)
 
 
-assembly = vault()
+assembly = parts()
 order = [assembly.names[i] for i in np.argsort(-part_bounds(assembly)[:, 1, 2], kind="stable")]
 motions = steps_in_space(assembly, assembly.names, order, [(n,) for n in order], [(0.0, 0.0, 1.0)] * len(order))
+start = time.perf_counter()
 timeline = Timeline(Staging(assembly, assembly.names, motions))
+print(f"film of {len(motions)} steps: {time.perf_counter() - start:.2f} s")
 server = LocalServer()
 scene = PlanScene(server)
 start = time.perf_counter()

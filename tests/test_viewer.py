@@ -442,7 +442,7 @@ def test_a_long_list_keeps_the_step_under_way_in_sight(shown):
 def test_where_there_is_no_plan_the_panel_says_why(shown):
     never = {"status": ns.Status.UNSOLVABLE, "why_not": ("a blocks b", "b blocks a")}
     stuck = staged(shown, [], **never)
-    assert "not even a first step works" in steps(stuck, None)
+    assert "No plan, and no step to show" in steps(stuck, None)
     assert steps(stuck, None).count("blocks") == 2
     assert "no plan" in caption(stuck, 0.0)
     some = staged(shown, shown.timeline.staging.motions[:2], refusals=shown.search.refusals[:1], **never)
@@ -509,6 +509,25 @@ def test_scores_are_cells_with_what_was_taken_ringed(rows, columns):
     assert ("left out" in text) == (columns > score_table.MOST_COLUMNS)
     for name in taken:
         assert f">{name}<" in text, "what was taken is never left out"
+
+
+def test_interchangeable_actions_share_a_column_of_a_wide_table():
+    names = [f"e{j}" for j in range(20)] + [f"o{j}" for j in range(20)]
+    classes = [0] * 20 + [1] * 20
+    log_prob = np.full((2, 40), -20.0)
+    log_prob[0, 3] = log_prob[1, 25] = 0.0
+    scores = ns.OrderScores(log_prob, tuple(names), classes=tuple(classes))
+    text = score_table.scores_table(scores, names, ["e7", "o9"])
+    assert text.count("<title>") == 4
+    assert ">e0 +19<" in text
+    # What was taken is as likely as what the prior names: ringed are the likely cells.
+    assert "step 1, e0 +19: 1<" in text
+    assert "step 2, o0 +19: 1<" in text
+    assert text.count("stroke=") == 2
+    assert "left out" not in text
+    assert "share a column" in text
+    few = score_table.scores_table(ns.OrderScores.uniform(2, ["a", "b"]), ["a", "b"], ["a"])
+    assert "share a column" not in few
 
 
 def test_large_tables_of_scores_are_pictures():
@@ -726,7 +745,7 @@ def test_an_assembly_is_planned_as_plan_plans_it(tmp_path, capsys):
     assert text.index(">high <") < text.index(">low <")
     # Nothing goes down through the table.
     assert call("view", tmp_path / "box.json", "--directions=-z", "--export", page) == 11
-    assert "not even a first step works" in page.read_text()
+    assert "No plan, and no step to show" in page.read_text()
     assert "Nothing can be taken out" in page.read_text()
 
 

@@ -31,8 +31,11 @@ def scores_table(scores: OrderScores | None, actions: Sequence[str], taken: Sequ
     """
     if scores is None:
         return "<p>Planned without a prior.</p>"
-    P = np.exp(scores.log_prob)
+    P, shared = np.exp(scores.log_prob), ""
     column = {name: j for j, name in enumerate(actions)}
+    if len(actions) > MOST_COLUMNS and len(P) <= MOST_ROWS and len(set(scores.classes)) < len(actions):
+        P, actions, column = _by_class(P, actions, scores.classes)
+        shared = " Interchangeable actions share a column (a +2: a and two more)."
     marks = [(i, column[name]) for i, name in enumerate(taken) if name in column and i < len(P)]
     left_out = ""
     if len(P) > MOST_ROWS:
@@ -45,7 +48,19 @@ def scores_table(scores: OrderScores | None, actions: Sequence[str], taken: Sequ
         place = {int(j): k for k, j in enumerate(kept)}
         drawn = _as_cells(P[:, kept], [actions[j] for j in kept], [(i, place[j]) for i, j in marks])
     said = "The darker, the likelier the prior holds an action (column) at a step (row); a ring marks what was taken."
-    return f"{drawn}<p class='quiet'>{said}{left_out}</p>"
+    return f"{drawn}<p class='quiet'>{said}{shared}{left_out}</p>"
+
+
+def _by_class(
+    P: NDArray[np.float64], actions: Sequence[str], classes: Sequence[int]
+) -> tuple[NDArray[np.float64], list[str], dict[str, int]]:
+    """A column a class, its probabilities summed; the columns' names; and the column of each action."""
+    members: dict[int, list[int]] = {}
+    for j, number in enumerate(classes):
+        members.setdefault(number, []).append(j)
+    names = [f"{actions[js[0]]} +{len(js) - 1}" if len(js) > 1 else actions[js[0]] for js in members.values()]
+    summed = np.stack([P[:, js].sum(axis=1) for js in members.values()], axis=1)
+    return summed, names, {actions[j]: k for k, js in enumerate(members.values()) for j in js}
 
 
 def _columns_to_show(P: NDArray[np.float64], taken: Sequence[int]) -> NDArray[np.int64]:

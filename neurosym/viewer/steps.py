@@ -62,7 +62,7 @@ def steps(shown: Shown, now: int | None, *, all_of_them: bool = False) -> str:
         style = " class='now' aria-current='step'" if i == now else ""
         rows.append(f"<li{style} data-step='{i}'>{escape(shown.search.steps[i])}{how}{star}</li>")
     if not total:
-        return f"{_none(shown)}<p>There is no step to show.</p>"
+        return _none(shown) or "<p>There is nothing to do.</p>"
     note = ""
     if looked_for:
         which = "a step marked * moves" if mixed else "parts move"
@@ -90,8 +90,10 @@ def _none(shown: Shown) -> str:
     because = f"<p><b>Why nothing more can be done</b></p><ul>{why}</ul>" if why else ""
     if shown.search.refusals:
         because += "<p>The tab Search has each refused attempt; look at one to see it in the view.</p>"
-    prefix = "the longest prefix that works is shown." if shown.search.steps else "not even a first step works."
-    return f"<p class='note'>No plan: {prefix}</p>{because}"
+    shows = (
+        "No plan: the longest prefix that works is shown." if shown.search.steps else "No plan, and no step to show."
+    )
+    return f"<p class='note'>{shows}</p>{because}"
 
 
 def _in_sight(now: int, total: int) -> tuple[int, int]:
