@@ -72,7 +72,8 @@ def read_xmpuzzle(path: Path, *, problem: int = 1, solution: int = 1) -> Content
         stored = [s for s in chosen.findall("solutions/solution") if s.find("assembly") is not None]
         if not stored:
             others = [str(n) for n, p in enumerate(problems, 1) if p.find("solutions/solution/assembly") is not None]
-            hint = f"Take problem {' or '.join(others)} (problem=, --puzzle)." if others else "Solve it in BurrTools, and save it again."
+            hint = f"Take problem {' or '.join(others)} (problem=, --puzzle)."
+            hint = hint if others else "Solve it in BurrTools, and save it again."
             raise AssemblyError(f"Expected problem {problem} of {path} to store a solution; it stores none. {hint}")
         words = (_chosen(stored, solution, "solution", path).findtext("assembly") or "").split()
         return _placed(pieces, words, path)
