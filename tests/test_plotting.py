@@ -56,6 +56,15 @@ def test_it_fits_a_column():
     assert iterations_figure(outcome()).get_figwidth() == COLUMN
 
 
+def test_a_long_name_of_a_prior_leaves_room_for_the_bars():
+    figure = iterations_figure(outcome(priors=("none", "runs/" + "a-long-name-" * 6 + "7.safetensors")))
+    figure.draw_without_rendering()
+    assert all(axis.get_window_extent().width > 0.5 * figure.bbox.width for axis in figure.axes)
+    said = [t.get_text() for t in figure.axes[0].get_yticklabels()]
+    assert said[0] == "no prior"
+    assert (said[1][:6], said[1][-1]) == ("a-long", "7")
+
+
 def test_bars_are_shares_of_all_runs():
     axis = iterations_figure(outcome(priors=("none",), planners=("swap-repair",))).axes[0]
     heights = sum(patch.get_height() for patch in axis.patches)

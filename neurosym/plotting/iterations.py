@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from neurosym.benchmark import NO_PRIOR, Outcome, Run
+from neurosym.plotting.layers import shortened
 from neurosym.plotting.style import COLOURS, COLUMN, LOOKS
 from neurosym.reporting import published
 
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
 
 #: Counts above this share one bar: the tail of a planner without a prior would squeeze all others.
 LAST_BAR = 12
+#: Longest name of a prior: bars need the room.
+MOST_LETTERS = 20
 
 
 def iterations_figure(outcome: Outcome) -> Figure:
@@ -71,7 +74,8 @@ def _colour(prior: str, position: int) -> str:
 
 
 def _dress(axis: Axes, planner: str, priors: Sequence[str], last: int) -> None:
-    names = ["no prior" if p == NO_PRIOR else p.rsplit("/", 1)[-1].removesuffix(".safetensors") for p in priors]
+    files = [p.rsplit("/", 1)[-1].removesuffix(".safetensors") for p in priors]
+    names = ["no prior" if p == NO_PRIOR else shortened(name, MOST_LETTERS) for p, name in zip(priors, files)]
     axis.set_yticks([len(priors) - 1 - i + 0.3 for i in range(len(priors))], names, fontsize=7)
     axis.set_ylim(-0.08, len(priors))
     axis.set_xlim(-0.65, last + 2.4)
