@@ -1039,6 +1039,35 @@ def test_stop_ends_a_search(tab, viewer):
     assert tab.errors == []
 
 
+def test_while_the_first_search_goes_on_the_page_shows_the_parts_and_how_far_it_is():
+    from neurosym.viewer.page import Page
+    from neurosym.viewer.server import LocalServer
+
+    slow = Slow(parts=14, seconds=0.05)
+    server = LocalServer()
+    page = Page(server, Query("slow", planner="exhaustive"), {"slow": lambda **options: slow.problem})
+    try:
+        assert page.slider.disabled
+        assert page.play.disabled
+        page.plan(page.query, slow.problem)
+        until(lambda: "attempts" in page.caption.content)
+        assert page.shown is None
+        assert len(page.scene.parts) == 14
+        assert all(part.visible for part in page.scene.parts)
+        page._clicked("p0")  # nothing is known of it yet
+        assert page.part.value == "(no part)"
+        until(lambda: page.planning.progress.depth > 0)
+        page._stop()
+        until(lambda: page.planning is None)
+        until(lambda: not page.slider.disabled)
+        page.shown = None
+        page.plan(replace(page.query, domain="soma", number=999))
+        until(lambda: "0 to 239" in page.caption.content)
+    finally:
+        page.close()
+        server.stop()
+
+
 def test_nobody_can_ask_for_a_tunnel(viewer):
     assert viewer.server.request_share_url() is None
     assert viewer.server.get_host() == "127.0.0.1"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 import time
 from collections.abc import Mapping
@@ -10,6 +11,7 @@ import viser
 
 from neurosym.errors import InputError
 from neurosym.language.domain import Problem
+from neurosym.motions import stage
 from neurosym.viewer import panels
 from neurosym.viewer.attempts import BECAUSE, MOST_REFUSALS, attempts, looked_at, most_refused
 from neurosym.viewer.attempts import REFUSED as TRIED
@@ -21,6 +23,7 @@ from neurosym.viewer.score_table import scores_table
 from neurosym.viewer.server import LocalServer
 from neurosym.viewer.shown import REFUSED, Maker, Query, Shown
 from neurosym.viewer.steps import caption, steps
+from neurosym.viewer.timeline import Timeline
 
 #: Scene updates a second while the film plays, and seconds that a step takes at speed 1.
 RATE, SECONDS_PER_STEP = 30.0, 1.5
@@ -92,6 +95,13 @@ class Page:
             make = problem_maker(query, self.given) if problem is None else lambda: problem
             self.planning = Planning(make, query)
             self.form.refuse("")
+            if self.shown is None and problem is not None:
+                self._preview(problem)
+
+    def _preview(self, problem: Problem) -> None:
+        """Show what is there before any step, while the first search goes on."""
+        with contextlib.suppress(*REFUSED):
+            self.scene.put(Timeline(stage(problem, ())))
 
     def close(self) -> None:
         """End the page's thread and any search; the server is left to who made it."""
@@ -108,8 +118,8 @@ class Page:
         gui.main_panel.dock_right()
         gui.main_panel.set_width(PANEL)
         self.caption = gui.add_html("")
-        self.slider = gui.add_slider("Step", min=0.0, max=1.0, step=0.01, initial_value=0.0)
-        self.play = gui.add_button("Play", icon=viser.Icon.PLAYER_PLAY)
+        self.slider = gui.add_slider("Step", min=0.0, max=1.0, step=0.01, initial_value=0.0, disabled=True)
+        self.play = gui.add_button("Play", icon=viser.Icon.PLAYER_PLAY, disabled=True)
         self.speed = gui.add_dropdown("Speed", SPEEDS, initial_value="1×")
         self.names = gui.add_checkbox("Names of parts", False)
         tabs = gui.add_tab_group()
@@ -188,6 +198,8 @@ class Page:
     def _picked(self, name: str) -> None:
         """A part was chosen."""
         with self._lock:
+            if self.shown is None:
+                return
             if self.part.value != name:
                 assign(self.part, name)  # which calls this again
                 return
@@ -266,11 +278,15 @@ class Page:
                 return
             if planning.running:
                 self.form.busy(planning)
+                if self.shown is None:
+                    self.caption.content = panels.styled(panels.progress(planning.progress, stopping=planning.stopped))
                 return
             self.planning = None
             self.form.busy(None)
             if planning.shown is None:
                 self.form.refuse(planning.message or "")
+                if self.shown is None:
+                    self.caption.content = panels.styled(panels.message(planning.message or ""))
                 return
             self.show(planning.shown)
             self.form.say(panels.overview(planning.shown))
