@@ -7,6 +7,7 @@ import os
 import shutil
 import subprocess
 import time
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -25,11 +26,12 @@ from neurosym.errors import InputError, NeurosymError, UnknownNameError
 from neurosym.geometry.assembly import Body, Box, Mesh, Part
 from neurosym.motions import Motion, Staging, building, pose_along, stage, steps_in_space
 from neurosym.plan_files import read_plan
-from neurosym.simulation import World, open_clients, replay_plan, replay_staging
+from neurosym.simulation import Physics, World, open_clients, replay_plan, replay_staging
 from neurosym.simulation.cutting import cut_into_convex
 from neurosym.simulation.decomposition import convex_pieces
 from neurosym.simulation.solids import rigid_bodies
 from neurosym.simulation.world_window import WorldWindow
+from neurosym.testing.burrs import burr
 from neurosym.ways import Way
 
 BEAM = {"post": [(0, 0, 0)], "beam": [(0, 0, 1), (1, 0, 1)], "weight": [(0, 0, 2)]}
@@ -223,6 +225,35 @@ def test_a_tower_is_built_and_one_that_leans_too_far_comes_down():
     assert "out" in report.steps[2].moved, "what arrives is to stand, too"
 
 
+def test_a_group_is_taken_apart_and_put_together_in_the_hand():
+    pairs = ns.Assembly.from_cells(burr("pairs").cells)
+    problem = ns.load_domain("assembly").problem(pairs, groups=True, gravity=False)
+    result = ns.solve(problem)
+    there = replay_plan(problem, result.plan, result.how)
+    back = replay_staging(stage(problem, result.reversed(), result.reversed().how), physics=Physics(gravity=0.0))
+    for report in (there, back):
+        assert report.ok, [step.reason for step in report.steps]
+        assert not report.gravity
+        assert [step.in_hand for step in report.steps].count(True) == 1
+    assert "taken from them" in next(step.reason for step in there.steps if step.in_hand)
+    assert "put together" in next(step.reason for step in back.steps if step.in_hand)
+
+
+def test_the_report_says_units_groups_and_what_is_held(tmp_path, capfd):
+    cells = {"foot": [(0, 0, 0)], "arm": [(0, 0, 1), (1, 0, 1), (2, 0, 1)], "load": [(0, 0, z) for z in range(2, 8)]}
+    assembly = replace(ns.Assembly.from_cells(cells), units="mm")
+    assembly.save(tmp_path / "crane.json")
+    path = tmp_path / "plan.json"
+    assert call("plan", tmp_path / "crane.json", "--held", "1", "--directions", "+z", "--out", path) == 0
+    capfd.readouterr()
+    assert call("replay", path) == 0
+    said = capfd.readouterr().out
+    assert "largest shift (mm)" in said
+    assert "load (arm held)" in said
+    assert "nothing is left" in said
+    assert " mm, which counts as moved" in said
+
+
 def test_cubes_are_judged_by_the_rule_of_the_paper():
     problem = SOMA.problem(17)
     result = ns.solve(problem)
@@ -319,8 +350,11 @@ def test_the_command_reports_each_step(plan_file, tmp_path, capfd):
     assert said["ok"]
     assert said["failed_at"] is None
     assert len(said["steps"]) == 7
-    keys = {"action", "parts", "displacement", "share", "stood_still", "moved", "in_the_way", "reason"}
+    keys = {"action", "parts", "displacement", "share", "stood_still", "moved", "in_the_way", "reason", "held"}
     assert keys <= said["steps"][0].keys()
+    assert said["gravity"]
+    assert said["friction"] == pytest.approx(0.5)
+    assert said["unit"] is None, "cells have no unit"
     assert call("replay", plan_file) == 0
     assert "stood still" in capfd.readouterr().out
     assert open_clients() == before

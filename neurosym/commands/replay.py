@@ -10,9 +10,10 @@ import typer
 
 from neurosym.commands.common import AsJson, console, print_json, write_json
 from neurosym.exit_codes import UNWELL
+from neurosym.words import joined
 
 if TYPE_CHECKING:
-    from neurosym.simulation.replay_report import ReplayReport
+    from neurosym.simulation.replay_report import ReplayReport, StepReplay
 
 
 class Bodies(StrEnum):
@@ -72,21 +73,41 @@ def replay(
 def _show(name: str, report: ReplayReport) -> None:
     from rich.table import Table
 
-    way = "pulled along by a grip" if report.pulled else "taken by hand"
+    came = bool(report.steps) and all(step.arrives for step in report.steps)
+    way = "pulled along by a grip" if report.pulled else f"{'placed' if came else 'taken'} by hand"
     what = "rigid parts" if report.bodies == "rigid" else "independent cubes"
-    table = Table(title=f"{name}: {what}, {way}", title_justify="left")
-    for heading, justify in (("step", "right"), ("action", "left"), ("largest displacement", "right")):
-        table.add_column(heading, justify=justify)  # type: ignore[arg-type]
-    for heading in ("of the smallest part", "the rest"):
-        table.add_column(heading, justify="right" if heading.startswith("of") else "left")
+    under = "" if report.gravity else ", no gravity"
+    table = Table(title=f"{name}: {what}, {way}{under}", title_justify="left")
+    table.add_column("step", justify="right")
+    table.add_column("action")
+    table.add_column(f"largest shift{f' ({report.unit})' if report.unit else ''}", justify="right")
+    table.add_column("of the smallest part", justify="right")
+    table.add_column("the rest")
     for number, step in enumerate((report.start, *report.steps)):
-        said = "stood still" if step.stood_still and not step.moved else step.reason
-        table.add_row(str(number), step.action, f"{step.displacement:.3g}", f"{step.share:.2%}", said)
+        # Less than this is what numbers are rounded to.
+        shift = step.displacement if step.displacement > 1e-6 * report.threshold else 0.0
+        table.add_row(str(number), _did(step), f"{shift:.2g}", f"{step.share:.2%}", _rest(step))
     console(table).print(table)
+    limit = f"{report.threshold:.3g} {report.unit or ''}".strip()
     failed = report.failed_at
     if failed is None:
-        print(f"The rest stood still at all {len(report.steps)} steps (what goes by {report.threshold:.3g} has moved).")
+        print(f"The rest stood still at all {len(report.steps)} steps: nothing went by {limit}, which counts as moved.")
     elif failed < 0:
         print(f"The assembly does not stand before the first step. {report.start.reason}")
     else:
-        print(f"Step {failed + 1}, {report.steps[failed].action}: {report.steps[failed].reason}")
+        print(f"Step {failed + 1}, {report.steps[failed].action}: {report.steps[failed].reason} ({limit} counts.)")
+
+
+def _did(step: StepReplay) -> str:
+    """The action; whoever else moves; what is held."""
+    others = [part for part in step.parts if part != step.action] if step.action in step.parts else []
+    said = f"{step.action} with {joined(others)}" if others else step.action
+    return f"{said} ({joined(step.held)} held)" if step.held else said
+
+
+def _rest(step: StepReplay) -> str:
+    if step.in_hand:
+        return "in the hand"
+    if step.farthest is None and step.stood_still:
+        return "nothing is left"
+    return "stood still" if step.stood_still and not step.moved else step.reason

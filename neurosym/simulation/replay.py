@@ -25,10 +25,9 @@ from neurosym.motions import Motion, Staging, stage
 from neurosym.simulation.carrying import Carrier, hold
 from neurosym.simulation.oracle import COLLAPSE_CUBES, CUBES_CLEARANCE
 from neurosym.simulation.physics import MOVED_SHARE, SETTLE_STEPS, Physics, Snapshot
-from neurosym.simulation.replay_report import ReplayReport, StepReplay, reason_of
+from neurosym.simulation.replay_report import ReplayReport, StepReplay, in_hand, reason_of
 from neurosym.simulation.world import World
 from neurosym.simulation.world_window import WorldWindow
-from neurosym.words import joined
 
 if TYPE_CHECKING:
     from neurosym.geometry.assembly import Assembly
@@ -124,7 +123,17 @@ def replay_staging(
             if stop_at_failure and not (steps[-1] if steps else start).stood_still:
                 break
             steps.append(run.step(motion))
-        return ReplayReport(start, tuple(steps), run.threshold, run.smallest, bodies, pulled)
+        return ReplayReport(
+            start,
+            tuple(steps),
+            run.threshold,
+            run.smallest,
+            bodies,
+            pulled,
+            unit=staging.assembly.units,
+            gravity=world.physics.gravity > 0,
+            friction=world.surface**2,
+        )
 
 
 class _Run:
@@ -142,6 +151,7 @@ class _Run:
         self.world, self.cubes, self.pulled, self.window = world, cubes, pulled and not cubes, window
         self.threshold = MOVED_SHARE * world.unit if threshold is None else threshold
         self.smallest = smallest_part(staging.assembly)
+        self._motions = staging.motions
 
     def start(self) -> StepReplay:
         """Let everything settle before the first step."""
@@ -154,11 +164,12 @@ class _Run:
         world = self.world
         there = {part for part, _ in world.bodies}
         if motion.arrives:
+            if self._comes_again(motion):
+                return in_hand(motion, "will arrive later, with others: put together in the hand.")
             world.add(*(name for name in motion.parts if name not in there))
         elif not there & set(motion.parts):
             # A sub-assembly that left as a whole is taken apart where nothing rests on it.
-            said = f"{joined(motion.parts)} left before, with others: taken from them in the hand."
-            return StepReplay(motion.action, motion.parts, False, 0.0, 0.0, None, {}, (), True, said)
+            return in_hand(motion, "left before, with others: taken from them in the hand.")
         before = world.poses()
         with ExitStack() as stack:
             if motion.held:
@@ -166,6 +177,11 @@ class _Run:
             carrier = Carrier(world, motion)
             blocked = self._pull(carrier) if self.pulled else self._by_hand(carrier)
         return self._judged(motion, before, blocked)
+
+    def _comes_again(self, motion: Motion) -> bool:
+        """Whether a later step brings what this one brings once more, as part of a group."""
+        later = self._motions[next(i for i, other in enumerate(self._motions) if other is motion) + 1 :]
+        return any(other.arrives and set(motion.parts) & set(other.parts) for other in later)
 
     def _pull(self, carrier: Carrier) -> tuple[str, ...]:
         motion = carrier.motion
@@ -218,7 +234,17 @@ class _Run:
         if moved and stood:
             reason += " One cube alone may fall, by this rule."
         return StepReplay(
-            motion.action, motion.parts, motion.arrives, distance, share, farthest, moved, blocked, stood, reason
+            motion.action,
+            motion.parts,
+            motion.arrives,
+            distance,
+            share,
+            farthest,
+            moved,
+            blocked,
+            stood,
+            reason,
+            motion.held,
         )
 
 

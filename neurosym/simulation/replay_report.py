@@ -18,6 +18,9 @@ class StepReplay:
         action: name of the action.
         parts: names of the parts that went, or came.
         arrives: whether they came.
+        held: names of the parts that were held meanwhile.
+        in_hand: whether it was done in the hand, where nothing else can fall: a group that left, or will arrive, as a
+            whole is taken apart, or put together, there.
         displacement: how far the farthest-moved corner of any part that stays went, in the assembly's length unit.
         share: the same, as a share of the smallest part (the smallest extent of any part).
         farthest: name of the part it belongs to; None when no part stays.
@@ -37,6 +40,8 @@ class StepReplay:
     in_the_way: tuple[str, ...]
     stood_still: bool
     reason: str
+    held: tuple[str, ...] = ()
+    in_hand: bool = False
 
 
 @dataclass(frozen=True)
@@ -50,6 +55,9 @@ class ReplayReport:
         smallest: the smallest extent of any part, same unit.
         bodies: ``"rigid"`` or ``"cubes"``, see `replay_plan`.
         pulled: whether parts were pulled along.
+        unit: of all lengths here, as the assembly says it; None: it does not.
+        gravity: whether there was any.
+        friction: coefficient between any two bodies, and the table.
     """
 
     start: StepReplay
@@ -58,6 +66,9 @@ class ReplayReport:
     smallest: float
     bodies: str
     pulled: bool
+    unit: str | None = None
+    gravity: bool = True
+    friction: float | None = None
 
     @property
     def failed_at(self) -> int | None:
@@ -78,6 +89,9 @@ class ReplayReport:
         return {
             "ok": self.ok,
             "failed_at": self.failed_at,
+            "unit": self.unit,
+            "gravity": self.gravity,
+            "friction": self.friction,
             "threshold": self.threshold,
             "smallest_part": self.smallest,
             "bodies": self.bodies,
@@ -88,7 +102,13 @@ class ReplayReport:
 
 
 def _step_json(step: StepReplay) -> dict[str, Any]:
-    return {**vars(step), "parts": list(step.parts), "moved": dict(step.moved), "in_the_way": list(step.in_the_way)}
+    return {
+        **vars(step),
+        "parts": list(step.parts),
+        "moved": dict(step.moved),
+        "in_the_way": list(step.in_the_way),
+        "held": list(step.held),
+    }
 
 
 def reason_of(
@@ -111,3 +131,11 @@ def reason_of(
     elif not said:
         said.append(f"The rest stood still; {farthest} moved by {distance:.2g}, {share:.2%} of the smallest part.")
     return " ".join(said)
+
+
+def in_hand(motion: Motion, what: str) -> StepReplay:
+    """A step that is done where nothing else can fall."""
+    said = f"{joined(motion.parts)} {what}"
+    return StepReplay(
+        motion.action, motion.parts, motion.arrives, 0.0, 0.0, None, {}, (), True, said, motion.held, in_hand=True
+    )
