@@ -3,6 +3,7 @@
 import itertools
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -318,6 +319,17 @@ def test_lines_of_labels_do_not_cross_and_names_keep_their_distance():
             heights = sorted(label.place[1] for label in labels if label.right == right)
             assert all(high - low > PITCH - 1e-9 for low, high in itertools.pairwise(heights))
             assert not heights or (heights[0] > 0.5 - 1e-9 and heights[-1] < 0.5 + PITCH * 25 + 1e-9)
+
+
+def test_names_are_not_levelled_where_lines_would_cross(monkeypatch):
+    points = {"a": (1.0, 1.2), "b": (1.0, 1.8)}
+
+    def exchanged(given, span):
+        return [replace(label, place=other.place) for label, other in zip(given, reversed(given))]
+
+    monkeypatch.setattr("neurosym.plotting.labels._levelled", exchanged)
+    a, b = in_columns({"a": "a", "b": "b"}, points, 0.8, 2.6, (0.5, 2.5))
+    assert a.place[1] < b.place[1]
 
 
 def test_a_dot_is_on_its_part_and_open_where_nothing_is_seen():
