@@ -278,6 +278,15 @@ def test_the_film_has_no_cuts_and_nothing_is_set_down_on_anything(staging):
     assert (boxes[:, 1] <= high + 1e-9).all()
 
 
+def test_many_parts_are_set_down_wide_so_that_the_work_stays_in_sight():
+    world = ns.Assembly.from_cells({f"p{x}{y}": [(x, y, 0)] for x in range(7) for y in range(7)})
+    motions = steps_in_space(world, world.names, world.names, [(n,) for n in world.names], [UP] * 49)
+    film = Timeline(Staging(world, world.names, motions))
+    boxes = film.bounds_at_rest + film.shifts[-1][:, None]
+    wide, deep = np.ptp(boxes[..., :2].reshape(-1, 2), axis=0)
+    assert deep < 0.6 * wide
+
+
 @pytest.mark.parametrize("t", [float("nan"), float("inf")])
 def test_a_time_is_a_number(film, t):
     with pytest.raises(ns.InputError, match="time"):

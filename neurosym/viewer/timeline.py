@@ -231,9 +231,9 @@ def _rows_before(assembly: Assembly, groups: Sequence[NDArray[np.int64]], backwa
     size = np.array([boxes[g, 1].max(axis=0) for g in groups]) - low
     gap = GAP * float(np.median(size[:, :2]))
     work = assembly.bounds
-    # About as wide as the work, or as a square of all footprints.
+    # About as wide as the work, or three times as wide as deep: many rows would push the work out of sight.
     area = float(np.prod(size[:, :2] + gap, axis=1).sum())
-    width = max(float(work[1, 0] - work[0, 0]), float(np.sqrt(1.5 * area)))
+    width = max(float(work[1, 0] - work[0, 0]), float(np.sqrt(3.0 * area)))
     left = float(work[0, 0] + work[1, 0] - width) / 2
     x, y, deep = left, float(work[0, 1]) - CLEAR * float(np.ptp(work, axis=0).max()), 0.0
     for i in reversed(range(len(groups))) if backwards else range(len(groups)):
