@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 
 import neurosym as ns
+from learned_priors import NetworkPrior
 from neurosym.errors import InputError
 from neurosym.geometry.joint_motion import plan_joint_motion
 from neurosym.motions import building, stage
 from neurosym.simulation.client import Client
-from neurosym.simulation.panda import BuildSettings, build_with_panda, starting_places
+from neurosym.simulation.panda import BuildSettings, CellFilm, build_with_panda, starting_places
 from neurosym.simulation.panda.arm import HOME, PandaArm, from_above
 from neurosym.simulation.panda.cell import Cell
 
@@ -144,3 +145,26 @@ def test_the_example_builds_and_keeps_what_stands(tmp_path, capsys):
         # What stands differs from the reference by less than a millimetre: by few pixels along edges.
         assert (picture != problem.observation).mean() < 0.02
     assert "It stands in its place." in capsys.readouterr().out
+    # What the robot recorded is what training reads: a short fit makes the order that it built likelier.
+    likely = []
+    for settings in ({"epochs": 1, "least_steps": 1}, {"epochs": 60, "least_steps": 60}):
+        prior = NetworkPrior("sinkhorn").fit(again, settings=settings)
+        scores = prior.read(again.pictures)
+        assert scores[0].log_prob.shape[1] == len(again.actions)
+        likely.append(sum(s.cost(0, int(row[0])) for s, row in zip(scores, again.sequences)))
+    assert likely[1] < likely[0] - 0.1, "cost is -log P"
+
+
+def test_those_who_watch_see_every_step_and_a_film_shows_the_arm():
+    size, X = np.full(3, 0.05), np.eye(4)
+    X[:3, 3] = 0.5, 0.0, 0.025
+    film, steps = CellFilm((96, 72), speed=2.0), []
+    with Cell({"block": size}, {"block": X}, colours={"block": (0.9, 0.0, 0.0)}) as cell:
+        cell.watchers += [film, lambda seen: steps.append(seen)]
+        cell.step(64)
+    assert len(steps) == 64
+    assert len(film.pictures) == 2, "every 32 steps of 1/240 s"
+    picture = film.pictures[0].astype(int)
+    assert picture.shape == (72, 96, 3)
+    assert ((picture[:, :, 0] > 2 * picture[:, :, 1]) & (picture[:, :, 0] > 80)).sum() > 3, "the red block"
+    assert (picture.max(axis=2) < 120).sum() > 20, "dark parts of the arm"
