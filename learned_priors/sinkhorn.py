@@ -43,7 +43,7 @@ def log_sinkhorn(
 ) -> Tensor:
     """log S(X), differentiable.
 
-    With potentials u (rows) and v (columns), starting from v = 0, it iterates::
+    With potentials u (rows) and v (columns), starting from v = 0, it iterates
 
         u_i = log sum_j exp(X_ij - v_j)        v_j = log sum_i exp(X_ij - u_i)
 

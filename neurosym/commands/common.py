@@ -49,6 +49,11 @@ FamilyOptions = Annotated[
     list[str] | None,
     typer.Option("--option", metavar="KEY=VALUE", help="An option of the family's problems. May be repeated."),
 ]
+# The help is rich's markup, in which a bracket that is meant as one is escaped.
+Cells = Annotated[
+    Path | None,
+    typer.Option("--cells", metavar="FILE", help='A puzzle of yours: JSON {"name": [\\[x,y,z], ...]}.'),
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object to stdout, and nothing else.")]
 
 

@@ -13,6 +13,7 @@ import typer
 from neurosym.commands.assemblies import FileOptions, RemovalOptions, load_assembly
 from neurosym.commands.common import (
     AsJson,
+    Cells,
     CollapseRule,
     FamilyOptions,
     Oracle,
@@ -53,9 +54,7 @@ def plan(
     ],
     *,
     number: Annotated[int | None, typer.Option("--problem", metavar="N", help="Number of the problem.")] = None,
-    cells: Annotated[
-        Path | None, typer.Option("--cells", metavar="FILE", help='A puzzle of yours: JSON {"name": [[x,y,z], ...]}.')
-    ] = None,
+    cells: Cells = None,
     planner: Annotated[
         str | None, typer.Option("--planner", metavar="P", help="Default backtracking; with --k best-first.")
     ] = None,

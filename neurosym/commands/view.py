@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from neurosym.commands.assemblies import FileOptions, RemovalOptions
-from neurosym.commands.common import CollapseRule, FamilyOptions, Oracle, OracleName, family_options, say
+from neurosym.commands.common import Cells, CollapseRule, FamilyOptions, Oracle, OracleName, family_options, say
 from neurosym.commands.plan import cells_in, pair_of
 from neurosym.errors import InputError
 
@@ -44,9 +44,7 @@ def view(
             help="Name of a prior, a weights file, or `none`. Default none; for an assembly outermost-first.",
         ),
     ] = None,
-    cells: Annotated[
-        Path | None, typer.Option("--cells", metavar="FILE", help='A puzzle of yours: JSON {"name": [[x,y,z], ...]}.')
-    ] = None,
+    cells: Cells = None,
     option: FamilyOptions = None,
     collapse: CollapseRule = None,
     before: Annotated[

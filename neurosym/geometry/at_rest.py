@@ -51,7 +51,8 @@ def tolerances_at_rest(assembly: Assembly, stated: bool) -> tuple[Tolerances, li
         return tolerances, [], faults
     (a, b), depth = max(slight.items(), key=lambda item: item[1])
     touch = max(min(_ABOVE * share, MAX_MATING), 1.01 * share)
-    said = f"Mating faces of {len(slight)} pairs of parts overlap, by up to {depth:.4g} between {a!r} and {b!r}; "
+    pairs = "one pair of parts" if len(slight) == 1 else f"{len(slight)} pairs of parts"
+    said = f"Mating faces of {pairs} overlap, by up to {depth:.4g} between {a!r} and {b!r}; "
     said += f"overlaps up to {touch * smallest:.4g} ({touch:.2g} of the smallest extent) are taken for touch."
     return replace(tolerances, touch=touch), [Note(a, "mating", depth, said, other=b)], faults
 
