@@ -61,7 +61,7 @@ def describe(staging: Staging, step: int) -> str:
     if not motion.arrives and not around >= set(staging.there(step)):
         said = f"take {name} off {_few(sorted(around - {part}))}"
     if len(motion.path) > 2:
-        way = f"along a path of {len(motion.path) - 1} moves"
+        way = "along a path"
     else:
         shift = motion.path[1, :3, 3] * (-1 if motion.arrives else 1)
         way = f"along {in_words((shift / np.linalg.norm(shift)).tolist())}" if shift.any() else "turning"

@@ -36,7 +36,7 @@ _PATIENCE, LINGER = 30.0, 1.5
 #: Where the time falls farther behind than this, it is not caught up (seconds).
 _BEHIND = 0.25
 #: Of PyBullet's window: top to bottom (degrees), and its size in pixels.
-_FIELD_OF_VIEW, _SIZE = 60.0, (1024, 768)
+_FIELD_OF_VIEW, _SIZE = 90.0, (1024, 768)
 
 
 @dataclass(frozen=True)
