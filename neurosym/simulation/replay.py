@@ -132,7 +132,7 @@ def replay_staging(
             pulled,
             unit=staging.assembly.units,
             gravity=world.physics.gravity > 0,
-            friction=world.surface**2,
+            friction=staging.assembly.friction if world.physics.friction is None else world.physics.friction,
         )
 
 
