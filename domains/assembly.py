@@ -131,6 +131,8 @@ class AssemblyFamily(ProblemFamily):
 
 def _assembly(given: Assembly | str | Path | int, units: str | None) -> tuple[Assembly, str]:
     """The assembly, and what to call it."""
+    if units is not None and not isinstance(given, str | Path):
+        raise InputError("Expected units with the path of files to read; an Assembly has its own. Leave them out.")
     if isinstance(given, Assembly):
         return given, "assembly"
     if isinstance(given, str | Path):

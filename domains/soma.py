@@ -112,9 +112,17 @@ class SomaFamily(ProblemFamily):
         )
 
     def problem_from_cells(
-        self, cells: Mapping[str, Iterable[Sequence[int]]], *, collapse: str = "cubes", **options: Any
+        self,
+        cells: Mapping[str, Iterable[Sequence[int]]],
+        *,
+        collapse: str = "cubes",
+        pictures: str = "clean",
+        seed: int = 0,
+        removed: Iterable[str] = (),
+        before: Iterable[tuple[str, str]] = (),
+        name: str = "puzzle",
     ) -> Problem:
-        """Any polycube puzzle, its pieces given as {name: [(x, y, z), ...]}, z up.
+        """Any polycube puzzle, its pieces given as {name: [(x, y, z), ...]}, z up; options as for `problem`.
 
         Raises:
             AssemblyError: pieces that overlap, repeat a cell, are not connected, float or are empty.
@@ -122,9 +130,11 @@ class SomaFamily(ProblemFamily):
         if not isinstance(cells, Mapping) or not cells:
             raise AssemblyError(f"Expected pieces as {{name: [(x, y, z), ...]}}, at least one; got {cells!r}.")
         assembly = Assembly.from_cells(cells)
-        for name, own in cells.items():
-            _check_connected(name, [tuple(c) for c in own])
-        return self.problem_from_assembly(assembly, collapse=collapse, **options)
+        for piece, own in cells.items():
+            _check_connected(piece, [tuple(c) for c in own])
+        return self.problem_from_assembly(
+            assembly, collapse=collapse, pictures=pictures, seed=seed, removed=removed, before=before, name=name
+        )
 
     def problem_from_assembly(
         self,

@@ -7,7 +7,6 @@ kept in a journal, and a comparison that was interrupted, or is asked again with
 from __future__ import annotations
 
 import hashlib
-import inspect
 import zlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
@@ -22,6 +21,7 @@ from neurosym.engines import cores, run_tasks
 from neurosym.errors import InputError
 from neurosym.family import Progress
 from neurosym.journal import Journal, key_of
+from neurosym.options import check_options
 from neurosym.pipeline import ORACLES, check_plan, open_oracle
 from neurosym.planner import Budget
 from neurosym.prior import OrderScores, Prior
@@ -71,11 +71,7 @@ class Comparison:
             raise InputError(f"Expected at least 1 seed; got {self.seeds}.")
         if self.oracle not in ORACLES:
             raise InputError(f"Expected an oracle, one of {', '.join(ORACLES)}; got {self.oracle!r}.")
-        family = load_domain(self.domain)
-        try:
-            inspect.signature(family.problem).bind(0, **self.options)
-        except TypeError as error:
-            raise InputError(f"Expected options that problems of {self.domain!r} take; {error}.") from None
+        check_options(load_domain(self.domain).problem, self.options, self.domain)
         for planner in self.planners:
             load_planner(planner)
 

@@ -14,6 +14,7 @@ import neurosym as ns
 from neurosym import __version__
 from neurosym.cli import main
 from neurosym.exit_codes import BAD_INPUT, EXIT_CODES, INTERRUPTED
+from neurosym.options import check_options, options_of
 from neurosym.weights_header import read_header
 
 #: The L before all others: under the rule `cubes` no order of cube 17 can.
@@ -319,3 +320,27 @@ def test_options_of_a_family_reach_its_problems(capsys):
         assert says in capsys.readouterr().err
     assert call("demos", "soma", "--out", "x.npz", "--option", "colour=red") == BAD_INPUT
     assert "colour" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("extra", [("--paths", "any"), ("--option", "nonsense=1")])
+@pytest.mark.parametrize("which", ["number", "cells"])
+def test_options_that_a_domain_does_not_take_are_refused_by_name(which, extra, tmp_path, capsys):
+    cells = tmp_path / "own.json"
+    cells.write_text('{"a": [[0, 0, 0]], "b": [[0, 0, 1]]}')
+    given = ("--problem", 17) if which == "number" else ("--cells", cells)
+    assert call("plan", "soma", *given, *extra) == BAD_INPUT
+    said = capsys.readouterr().err
+    assert "collapse" in said
+    assert extra[-1].partition("=")[0] in said or "paths" in said
+
+
+def test_options_are_all_but_what_names_the_problem():
+    def problem(number, variant="a", *, seed=0): ...
+
+    assert options_of(problem) == {"variant": "a", "seed": 0}
+    check_options(problem, ["variant"], "x")
+    with pytest.raises(ns.InputError, match="among variant, seed; got number"):
+        check_options(problem, ["number"], "x")
+    with pytest.raises(ns.InputError, match="no option"):
+        check_options(lambda number: number, ["seed"], "x")
+    check_options(lambda number, **options: number, ["anything"], "x")

@@ -24,6 +24,7 @@ import neurosym as ns
 from neurosym.cli import main
 from neurosym.geometry.meshes import signed_volume
 from neurosym.motions import Motion, Staging, stage, steps_in_space
+from neurosym.options import options_of
 from neurosym.testing import burrs
 from neurosym.viewer import panels, score_table
 from neurosym.viewer.attempts import BECAUSE, FEW, MOST_COUNTED, MOST_REFUSALS, attempts, most_refused
@@ -31,7 +32,7 @@ from neurosym.viewer.attempts import REFUSED as TRIED
 from neurosym.viewer.export import PAUSE, SECONDS_PER_STEP, _with_panel
 from neurosym.viewer.facts import part_facts
 from neurosym.viewer.follow import follower
-from neurosym.viewer.planning import Planning, options_of, problem_maker
+from neurosym.viewer.planning import Planning, problem_maker
 from neurosym.viewer.shown import Query, Search, Shown
 from neurosym.viewer.solids import solids
 from neurosym.viewer.sources import open_source

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -28,6 +28,7 @@ from neurosym.commands.common import (
 from neurosym.errors import InputError
 from neurosym.family import ProblemFamily
 from neurosym.geometry.directions import in_words
+from neurosym.options import check_options
 from neurosym.plan_files import SCHEMA
 from neurosym.ways import Way
 from neurosym.words import joined
@@ -114,7 +115,7 @@ def plan(
         source = {} if cells is None else {"cells": cells_in(cells)}
     else:
         assembly = load_assembly(path, files)
-        problem = _made(family, assembly, options | {"name": path.resolve().name})
+        problem = _made(family.problem, assembly, options | {"name": path.resolve().name}, family.name)
         source = {"assembly": reference(path, files.reading(), assembly)}
     if prior is None:
         prior = NO_PRIOR if path is None else UNTRAINED
@@ -177,19 +178,19 @@ def _problem(family: ProblemFamily, number: int | None, cells: Path | None, opti
     if (number is None) == (cells is None):
         raise InputError("Expected either --problem N or --cells FILE, one of them.")
     if cells is None:
-        return _made(family, number, options)
+        return _made(family.problem, number, options, family.name)
     make = getattr(family, "problem_from_cells", None)
     if make is None:
         raise InputError(f"Expected a domain of polycube puzzles (soma) for --cells; {family.name!r} is none.")
-    problem: Problem = make(cells_in(cells), **options)
-    return problem
+    return _made(make, cells_in(cells), options, family.name)
 
 
-def _made(family: ProblemFamily, given: Any, options: dict[str, Any]) -> Problem:
+def _made(make: Callable[..., Problem], given: Any, options: dict[str, Any], whose: str) -> Problem:
+    check_options(make, options, whose)
     try:
-        return family.problem(given, **options)
+        return make(given, **options)
     except TypeError as error:
-        raise InputError(f"Expected options that problems of {family.name!r} take; {error}.") from None
+        raise InputError(f"Expected options that problems of {whose!r} take; {error}.") from None
 
 
 def cells_in(path: Path) -> dict[str, Any]:

@@ -9,10 +9,11 @@ from typing import Any
 import viser
 
 from neurosym.errors import InputError
+from neurosym.options import options_of
 from neurosym.pipeline import ORACLES
 from neurosym.registry import domain_names, planner_names, prior_names
 from neurosym.viewer import panels
-from neurosym.viewer.planning import Planning, maker_of, options_of
+from neurosym.viewer.planning import Planning, maker_of
 from neurosym.viewer.shown import REFUSED, Maker, Query
 
 NO_PRIOR = "none"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import logging
 import threading
 import time
@@ -13,6 +12,7 @@ from typing import Any
 
 from neurosym.errors import InputError, UnknownNameError
 from neurosym.language.domain import Problem
+from neurosym.options import check_options
 from neurosym.pipeline import ORACLES, advice, solve
 from neurosym.planner import Budget, SearchLog
 from neurosym.registry import load_domain, planner_names, prior_names
@@ -139,14 +139,6 @@ def maker_of(domain: str, given: Mapping[str, Maker]) -> Maker:
     return given[domain] if domain in given else load_domain(domain).problem
 
 
-def options_of(make: Maker) -> dict[str, Any] | None:
-    """The options that problems take, with their defaults (`inspect.Parameter.empty` for none); None: any."""
-    parameters = inspect.signature(make).parameters.values()
-    if any(p.kind is p.VAR_KEYWORD for p in parameters):
-        return None
-    return {p.name: p.default for p in parameters if p.kind is p.KEYWORD_ONLY}
-
-
 def problem_maker(query: Query, given: Mapping[str, Maker]) -> Callable[[], Problem]:
     """A function that makes the problem of a query.
 
@@ -157,11 +149,7 @@ def problem_maker(query: Query, given: Mapping[str, Maker]) -> Callable[[], Prob
         InputError: no such domain, no number where one is needed, or an option that the domain does not take.
     """
     make = maker_of(query.domain, given)
-    known = options_of(make)
-    wrong = [] if known is None else [name for name in query.options if name not in known]
-    if known is not None and wrong:
-        takes = f"options of {query.domain!r} among {', '.join(known)}" if known else f"no option for {query.domain!r}"
-        raise InputError(f"Expected {takes}; got {', '.join(wrong)}.")
+    check_options(make, query.options, query.domain)
     if query.domain not in given:
         if query.number is None:
             raise InputError(f"Expected the number of a problem of {query.domain!r}; got none.")

@@ -1,0 +1,35 @@
+"""Options of functions that make problems: which there are, and a refusal, by name, of those that there are not."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Iterable
+from typing import Any
+
+from neurosym.errors import InputError
+
+
+def options_of(make: Callable[..., Any]) -> dict[str, Any] | None:
+    """The options that a function takes, with their defaults (`inspect.Parameter.empty` for none); None: any.
+
+    Its first parameter, where that can be given by position, says which problem, and is none of them.
+    """
+    parameters = [*inspect.signature(make).parameters.values()]
+    if any(p.kind is p.VAR_KEYWORD for p in parameters):
+        return None
+    if parameters and parameters[0].kind is parameters[0].POSITIONAL_OR_KEYWORD:
+        parameters = parameters[1:]
+    return {p.name: p.default for p in parameters if p.kind in (p.KEYWORD_ONLY, p.POSITIONAL_OR_KEYWORD)}
+
+
+def check_options(make: Callable[..., Any], given: Iterable[str], whose: str) -> None:
+    """Refuse names of options that a function does not take.
+
+    Raises:
+        InputError: there are such; the message has those that it takes.
+    """
+    known = options_of(make)
+    wrong = [] if known is None else [name for name in given if name not in known]
+    if known is not None and wrong:
+        takes = f"options of {whose!r} among {', '.join(known)}" if known else f"no option for {whose!r}"
+        raise InputError(f"Expected {takes}; got {', '.join(wrong)}.")
