@@ -314,6 +314,16 @@ def test_the_command_draws_a_plan(plan_file, tmp_path, capfd):
     assert open_clients() == before
 
 
+def test_an_exploded_view_for_print_is_lines_and_faces(plan_file, tmp_path):
+    once, again, paper = tmp_path / "a" / "x.svg", tmp_path / "b" / "x.svg", tmp_path / "x.pdf"
+    for out in (once, again):
+        assert call("render", "soma", "--plan", plan_file, "--exploded", out, "--from", "-40,30") == 0
+    assert once.read_bytes() == again.read_bytes()
+    assert b"<image" not in once.read_bytes()
+    assert call("render", "assembly", "--problem", "0", "--exploded", paper) == 0
+    assert paper.read_bytes().startswith(b"%PDF")
+
+
 def test_the_command_draws_what_has_no_plan(tmp_path):
     for what, number in (("soma", 17), ("tower", 3), ("assembly", 0)):
         out = tmp_path / f"{what}.png"
@@ -327,7 +337,7 @@ def test_the_command_draws_what_has_no_plan(tmp_path):
         ([], "--out FILM"),
         (["--out", "x.gif"], "--plan"),
         (["--plan", "PLAN", "--out", "x.avi"], "end in"),
-        (["--exploded", "x.jpg"], ".png"),
+        (["--exploded", "x.jpg"], ".svg"),
         (["--exploded", "x.png", "--size", "big"], "--size"),
         (["--exploded", "x.png", "--size", "0x0"], "--size"),
         (["--exploded", "x.png", "--from", "up"], "--from"),

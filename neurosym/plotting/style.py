@@ -72,6 +72,8 @@ def save(figure: Figure, path: str | Path, *, dpi: int = 200) -> Path:
             # Identifiers in an SVG are random, and its date is now, unless told otherwise.
             with matplotlib.rc_context({"svg.hashsalt": Path(path).name}):
                 figure.savefig(temporary, metadata={"Date": None})
+        elif Path(path).suffix == ".pdf":
+            figure.savefig(temporary, metadata={"CreationDate": None})
         else:
             figure.savefig(temporary, dpi=dpi)
     return Path(path)
