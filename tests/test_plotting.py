@@ -25,10 +25,11 @@ from neurosym.plotting import (
     repeats_figure,
     save,
 )
-from neurosym.plotting.exploded import MOST_NAMED
+from neurosym.plotting.exploded import _FIXED, MOST_NAMED, _colours
 from neurosym.plotting.labels import PITCH, crosses, in_columns
 from neurosym.plotting.painter import Piece, back_to_front
 from neurosym.plotting.solids import pieces_of, seen_from
+from neurosym.simulation.scene import part_colours
 from neurosym.testing.burrs import burr
 
 
@@ -347,6 +348,17 @@ def test_fixed_parts_are_grey_and_wrong_requests_are_refused():
         exploded_figure(stool, view=(0, float("nan")))
     with pytest.raises(ns.InputError, match="spread of 0 or more"):
         exploded_figure(Staging(stool, stool.names, ()), spread=-1)
+
+
+def test_each_part_of_an_exploded_view_has_a_colour_of_its_own():
+    row = ns.Assembly.from_cells({f"p{i}": [(i, 0, 0)] for i in range(12)}).with_fixed(["p3"])
+    staging = Staging(row, row.names, (), {"p5": (0.1, 0.2, 0.3)})
+    colours = _colours(staging)
+    assert len(set(colours)) == 12
+    assert colours[5] == (0.1, 0.2, 0.3)
+    assert colours[3] == _FIXED
+    films = part_colours(staging)
+    assert all(colours[i] == films[name] for i, name in enumerate(row.names) if i != 3)
 
 
 def test_an_exploded_view_loads_no_simulator():

@@ -122,14 +122,11 @@ def _numbers(staging: Staging) -> dict[str, str]:
 
 
 def _colours(staging: Staging) -> list[RGB]:
-    """One a part: its own, grey if it is fixed, or by its place."""
-    from neurosym.simulation.scene import PALETTE  # loads no simulator
+    """One a part, as in films; what is fixed in a paler grey, on which lines show."""
+    from neurosym.simulation.scene import part_colours  # loads no simulator
 
-    found = []
-    for k, name in enumerate(staging.assembly.names):
-        other = _FIXED if name in staging.assembly.fixed else PALETTE[k % len(PALETTE)]
-        found.append(staging.colours.get(name, other))
-    return found
+    found = part_colours(staging) | {name: _FIXED for name in staging.assembly.fixed if name not in staging.colours}
+    return [found[name] for name in staging.assembly.names]
 
 
 def _cube_edge(assembly: Assembly) -> float | None:

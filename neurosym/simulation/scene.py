@@ -32,7 +32,7 @@ PALETTE: tuple[RGB, ...] = (
 )
 
 
-#: Colour of parts that never move, RGB in 0..1, in films and windows.
+#: Colour of parts that never move, RGB in 0..1, in films, windows and the page.
 FIXED: RGB = (0.55, 0.55, 0.53)
 
 

@@ -1,15 +1,12 @@
-"""How the 3D view looks: its light, its camera, and the colours of parts that have none of their own."""
+"""How the 3D view looks: its light and its camera."""
 
 from __future__ import annotations
 
-import colorsys
 import itertools
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-
-from neurosym.simulation.scene import PALETTE, palette_colour
 
 if TYPE_CHECKING:
     import viser
@@ -23,20 +20,6 @@ FIELD_OF_VIEW, FROM, MARGIN = 0.7, np.array([0.35, -0.75, 0.56]), 1.05
 #: Light: colours (0..255) of the sky and of what the ground throws back, with their strength; strength of the sun, and
 #: where it stands. The viewer's film curve makes bright colours pale, so that no face may get more than about 4 in all.
 SKY, SUN, SUN_FROM = ((255, 255, 255), (165, 165, 170), 2.2), 2.0, np.array([-0.35, -0.6, 1.0])
-
-#: Colour of parts that never move, RGB in 0..1.
-FIXED = (0.55, 0.55, 0.53)
-
-
-def part_colour(number: int, of: int) -> tuple[float, float, float]:
-    """The colour of a part without one of its own, RGB in 0..1: as in pictures while the palette has enough of them.
-
-    Lighter and darker turns of the palette end in white and black; many parts go round the colour circle instead, each
-    a golden angle from the last.
-    """
-    if of <= 3 * len(PALETTE):
-        return palette_colour(number)
-    return colorsys.hsv_to_rgb(0.618034 * number % 1.0, (0.5, 0.62, 0.38)[number % 3], (0.9, 0.74, 0.98)[number % 3])
 
 
 def light(scene: viser.SceneApi) -> None:

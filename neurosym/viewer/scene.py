@@ -9,7 +9,8 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
-from neurosym.viewer.look import FIELD_OF_VIEW, FIXED, camera_for, light, part_colour
+from neurosym.simulation.scene import part_colours
+from neurosym.viewer.look import FIELD_OF_VIEW, camera_for, light
 from neurosym.viewer.solids import Solid, solids
 from neurosym.viewer.steps import HELD
 from neurosym.viewer.timeline import Timeline, floor_of
@@ -33,6 +34,11 @@ HELD_BY = 3.0
 _UPWARD = (0.0, 1.0, 0.0, 0.0)
 
 _EDGE, _PICKED = (45, 45, 45), (213, 94, 0)
+
+
+def _rgb(colour: tuple[float, float, float]) -> RGB:
+    r, g, b = (round(255 * share) for share in colour)
+    return r, g, b
 
 
 def named_at_first(timeline: Timeline | None) -> bool:
@@ -80,6 +86,7 @@ class PlanScene:
         self._sent = np.full((len(assembly), 8), np.nan)
         self.scale = SIZE / float((high - low).max())
         self.origin = np.array([*(low[:2] + high[:2]) / 2, floor_of(assembly)])
+        self._colours = [_rgb(colour) for colour in part_colours(timeline.staging).values()]
         self._thick = 0.0035 * SIZE * min(1.0, 6.0 / len(assembly) ** 0.5)
         for i, solid in enumerate(solids(assembly)):
             self._add_part(timeline, i, solid)
@@ -90,9 +97,7 @@ class PlanScene:
         """A part's mesh, and under it in the tree its outline, its picture and its name."""
         assembly, scene = timeline.staging.assembly, self.server.scene
         name, middle = assembly.names[i], timeline.centres[i]
-        own = FIXED if name in assembly.fixed else part_colour(i, len(assembly))
-        r, g, b = (round(255 * c) for c in timeline.staging.colours.get(name, own))
-        self._colours.append((r, g, b))
+        r, g, b = self._colours[i]
         vertices, outline = (solid.vertices - middle) * self.scale, (solid.outline - middle) * self.scale
         node = scene.add_mesh_simple(f"/parts/{i}", vertices, solid.faces, color=(r, g, b), flat_shading=True)
         if len(outline):
