@@ -703,6 +703,10 @@ def test_a_domain_or_a_path_and_nothing_else():
     with pytest.raises(ns.UnknownNameError, match="no file or folder"):
         open_source(Query("nowhere"))
     assert open_source(Query("soma")).query.number == 0
+    with pytest.raises(ns.InputError, match=r"got 'tower'\.$"):
+        open_source(Query("tower"), {"a": [(0, 0, 0)]})
+    with pytest.raises(ns.InputError, match=r"got 'soma' and the number 3\.$"):
+        open_source(Query("soma", 3), {"a": [(0, 0, 0)]})
 
 
 def test_cells_travel_with_their_plan(tmp_path, capsys):
@@ -988,6 +992,13 @@ def test_a_refusal_shows_what_stood_in_the_way(viewer, shown):
     assert dict(zip(shown.timeline.names, [tuple(part.color) for part in viewer.scene.parts])) == own
 
 
+def test_a_late_click_on_what_was_shown_before_changes_nothing(viewer, shown):
+    viewer.show(shown)
+    viewer._clicked("no longer there")
+    assert viewer.part.value == "(no part)"
+    assert {part.opacity for part in viewer.scene.parts} == {None}
+
+
 def test_bad_input_shows_a_message(tab, viewer):
     tab.get_by_role("tab", name="Plan again").click()
     for number, said in (("nonsense", "whole number"), ("999", "0 to 239")):
@@ -1047,6 +1058,28 @@ def test_stop_ends_a_search(tab, viewer):
     until(lambda: viewer.shown.problem.name == "slow")
     tab.get_by_text("Stopped").locator("visible=true").first.wait_for()
     assert tab.errors == []
+
+
+def test_what_cannot_be_shown_is_said_and_the_page_goes_on(shown, monkeypatch, caplog):
+    from neurosym.viewer.page import Page
+    from neurosym.viewer.server import LocalServer
+
+    server = LocalServer()
+    page = Page(server, Query("soma", 17))
+    try:
+        with monkeypatch.context() as patch:
+            patch.setattr(panels, "pictures", lambda views: 1 / 0)
+            page.plan(page.query)
+            until(lambda: "cannot be shown: ZeroDivisionError" in page.form.message.content)
+        assert "What was planned cannot be shown." in caplog.text
+        page.plan(page.query)
+        until(lambda: page.shown is not None and page.planning is None)
+        page.play.label = "Play"
+        page._toggle()
+        until(lambda: page.slider.value > 0)
+    finally:
+        page.close()
+        server.stop()
 
 
 def test_while_the_first_search_goes_on_the_page_shows_the_parts_and_how_far_it_is():

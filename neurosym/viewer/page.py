@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 import threading
 import time
 from collections.abc import Mapping
@@ -24,6 +25,8 @@ from neurosym.viewer.server import LocalServer
 from neurosym.viewer.shown import REFUSED, Maker, Query, Shown
 from neurosym.viewer.steps import caption, steps
 from neurosym.viewer.timeline import Timeline
+
+_log = logging.getLogger(__name__)
 
 #: Scene updates a second while the film plays, and seconds that a step takes at speed 1.
 RATE, SECONDS_PER_STEP = 30.0, 1.5
@@ -106,8 +109,7 @@ class Page:
     def close(self) -> None:
         """End the page's thread and any search; the server is left to who made it."""
         self._closed.set()
-        if self.planning is not None:
-            self.planning.stop()
+        self._stop()
         self._clock.join(5.0)
 
     # -- the panel --------------------------------------------------------------------------------------------
@@ -198,7 +200,8 @@ class Page:
     def _picked(self, name: str) -> None:
         """A part was chosen."""
         with self._lock:
-            if self.shown is None:
+            # A click may come late, for a part of what was shown before.
+            if self.shown is None or name not in self.part.options:
                 return
             if self.part.value != name:
                 assign(self.part, name)  # which calls this again
@@ -267,8 +270,9 @@ class Page:
             self.form.refuse(str(error))
 
     def _stop(self) -> None:
-        if self.planning is not None:
-            self.planning.stop()
+        planning = self.planning  # asked once: it may end meanwhile
+        if planning is not None:
+            planning.stop()
 
     def _watch(self) -> None:
         """What a search that is under way, or has just ended, shows."""
@@ -288,7 +292,13 @@ class Page:
                 if self.shown is None:
                     self.caption.content = panels.styled(panels.message(planning.message or ""))
                 return
-            self.show(planning.shown)
+            try:
+                self.show(planning.shown)
+            except Exception as error:
+                # A plug-in's fault, such as pictures that are none: the page says so and goes on.
+                _log.exception("What was planned cannot be shown.")
+                self.form.refuse(f"What was planned cannot be shown: {type(error).__name__}: {error}")
+                return
             self.form.say(panels.overview(planning.shown))
 
     def _run(self) -> None:

@@ -79,7 +79,8 @@ def _puzzle(query: Query, cells: Mapping[str, Any]) -> Source:
     family = load_domain(query.domain)
     make = getattr(family, "problem_from_cells", None)
     if make is None or query.number is not None:
-        raise InputError(f"Expected cells with a domain of polycube puzzles (soma), without a number; got {query}.")
+        said = f"{query.domain!r}{'' if query.number is None else f' and the number {query.number}'}"
+        raise InputError(f"Expected cells with a domain of polycube puzzles (soma), without a number; got {said}.")
     given: dict[str, Maker] = {PUZZLE: partial(make, cells)}
     query = replace(query, domain=PUZZLE)
     return Source(query, problem_maker(query, given)(), given)
