@@ -29,7 +29,9 @@ from neurosym.plan_files import read_plan
 from neurosym.simulation import Physics, World, open_clients, replay_plan, replay_staging
 from neurosym.simulation.cutting import cut_into_convex
 from neurosym.simulation.decomposition import convex_pieces
+from neurosym.simulation.looks import Camera
 from neurosym.simulation.solids import rigid_bodies
+from neurosym.simulation.window import Window
 from neurosym.simulation.world_window import WorldWindow
 from neurosym.testing.burrs import burr
 from neurosym.ways import Way
@@ -265,6 +267,32 @@ def test_cubes_are_judged_by_the_rule_of_the_paper():
     assert failed.failed_at == ns.validate(problem, bad).failed_at
 
 
+@pytest.mark.parametrize("bodies", ["rigid", "cubes"])
+def test_a_window_is_told_of_every_time_step(bodies, monkeypatch):
+    ticks, steps, world_step = [], [], World.step
+
+    class Watched:
+        def __init__(self, world, staging):
+            pass
+
+        def tick(self):
+            ticks.append(len(steps))
+
+        def __enter__(self):
+            return self
+
+        def __exit__(self, *error):
+            pass
+
+    monkeypatch.setattr("neurosym.simulation.replay.WorldWindow", Watched)
+    monkeypatch.setattr(World, "step", lambda self: steps.append(world_step(self)))
+    assembly = ns.Assembly.from_cells({"low": [(0, 0, 0)], "high": [(0, 0, 1)]})
+    motions = steps_in_space(assembly, assembly.names, ["high"], [("high",)], [(0, 0, 1)])
+    staging = Staging(assembly, assembly.names, motions)
+    assert replay_staging(staging, bodies=bodies, window=True).ok
+    assert ticks == list(range(1, len(steps) + 1))
+
+
 def u_shape():
     """A channel along y, 3 wide, 2 high, its hollow 1 wide and 1 deep, as a mesh: volume 5."""
     outline = [(0, 0), (3, 0), (3, 2), (2, 2), (2, 1), (1, 1), (1, 2), (0, 2)]
@@ -424,6 +452,15 @@ def test_a_window_without_a_screen_is_refused_and_ends_nothing(plan_file, monkey
     assert call("replay", plan_file, "--gui") == 33
     assert "Expected a screen" in capfd.readouterr().err
     assert open_clients() == before
+
+
+def test_a_window_that_has_nothing_to_show_starts_no_process(monkeypatch):
+    started = []
+    monkeypatch.setenv("DISPLAY", ":40931")
+    monkeypatch.setattr(subprocess, "Popen", lambda *command, **options: started.append(command))
+    with pytest.raises(ValueError, match="zero-size"):
+        Window([], np.zeros((0, 3)), Camera(0, 0), None)
+    assert started == []
 
 
 def test_a_screen_that_does_not_answer_is_refused_in_our_words(plan_file, monkeypatch, capfd):

@@ -37,7 +37,7 @@ DEFAULT_CAMERA = Camera(-58, 24, field_of_view=26.0)
 TOPS_CAMERA = Camera(-78, 50, field_of_view=26.0)
 #: A picture on a part's top is drawn so many times larger, smoothly: the renderer takes the nearest pixel.
 _FINER = 8
-#: Where hidden parts wait: behind the camera.
+#: Where hidden parts wait: beyond what the camera sees.
 _AWAY = 1e3
 
 

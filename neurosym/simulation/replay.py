@@ -156,7 +156,7 @@ class _Run:
     def start(self) -> StepReplay:
         """Let everything settle before the first step."""
         before = self.world.poses()
-        self._settle()
+        self.world.settle(watch=self._show)
         return self._judged(Motion("(start)", (), np.tile(np.eye(4), (2, 1, 1))), before, ())
 
     def step(self, motion: Motion) -> StepReplay:
@@ -188,7 +188,7 @@ class _Run:
         behind = carrier.pull(self._show)
         if not motion.arrives:
             self.world.remove(*motion.parts)
-        self._settle()
+        self.world.settle(watch=self._show)
         return motion.parts if behind > JAMMED_SHARE * self.world.unit else ()
 
     def _by_hand(self, carrier: Carrier) -> tuple[str, ...]:
@@ -203,17 +203,12 @@ class _Run:
         carrier.put(0.0)
         carrier.collide(True)
         if motion.arrives:
-            self._settle()
+            self.world.settle(watch=self._show)
         else:
             self.world.remove(*motion.parts)
             if self.cubes:
-                self.world.settle(2 * SETTLE_STEPS, until_rest=True)
+                self.world.settle(2 * SETTLE_STEPS, until_rest=True, watch=self._show)
         return blocked
-
-    def _settle(self) -> None:
-        for _ in range(SETTLE_STEPS):
-            self.world.step()
-            self._show()
 
     def _show(self) -> None:
         if self.window is not None:

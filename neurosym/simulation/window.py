@@ -68,7 +68,6 @@ class Window:
     """
 
     def __init__(self, bodies: Sequence[Shown], room: Array, camera: Camera, ground: float | None) -> None:
-        self._process = _started()
         # The same view as a film's, told as PyBullet wants it: it stands so far from the middle of the picture.
         seen = replace(camera, field_of_view=_FIELD_OF_VIEW)
         V = aimed(room, seen, _SIZE)[0]
@@ -84,6 +83,7 @@ class Window:
             "light": (target + 10 * distance * LIGHT).tolist(),
         }
         self._ready = True
+        self._process = _started()
         try:
             if not (self._send(json.dumps(scene).encode() + b"\n") and self._heard(_PATIENCE)):
                 raise NeurosymError(

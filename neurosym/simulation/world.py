@@ -6,7 +6,7 @@ because Bullet is less trustworthy with small bodies (5 cm cubes were judged wro
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from math import sqrt
 from types import TracebackType
 from typing import TYPE_CHECKING
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from neurosym.geometry.assembly import Assembly
 
 Array = NDArray[np.float64]
+
 
 class World:
     """An assembly on its table, in a simulator of its own (a context manager).
@@ -149,11 +150,26 @@ class World:
         """Advance by `steps` time steps."""
         self._bodies.step(steps)
 
-    def settle(self, steps: int = SETTLE_STEPS, *, until_rest: bool = False) -> int:
-        """Let things fall for at most `steps`; with `until_rest`, stop once nothing moves. Returns the steps taken."""
+    def settle(
+        self,
+        steps: int = SETTLE_STEPS,
+        *,
+        until_rest: bool = False,
+        watch: Callable[[], None] | None = None,
+    ) -> int:
+        """Let things fall for at most `steps`; with `until_rest`, stop once nothing moves.
+
+        Args:
+            watch: called after each time step.
+
+        Returns:
+            The steps taken.
+        """
         quiet = 0
         for done in range(1, steps + 1):
             self.step()
+            if watch is not None:
+                watch()
             if until_rest:
                 # What has just begun to fall, or turns at the top of a swing, is slow for a moment too.
                 quiet = quiet + 1 if max(self.motion().values(), default=0.0) < REST else 0
