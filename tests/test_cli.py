@@ -252,6 +252,12 @@ def test_list_names_everything_registered(capsys):
     }
 
 
+def test_weights_of_one_domain_that_several_packages_have_are_all_listed(monkeypatch, capsys):
+    monkeypatch.setattr("neurosym.catalogue.weights_beside", lambda entry: {"soma": [entry.name]})
+    assert call("list", "--json") == 0
+    assert json.loads(capsys.readouterr().out)["weights"] == {"soma": ns.prior_names()}
+
+
 def test_list_loads_no_network_library():
     code = "import sys, neurosym.cli as c\ntry: c.main(['list'])\nexcept SystemExit: print('torch' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -24,7 +24,9 @@ def names(as_json: AsJson = False) -> None:
     priors = {entry.name: summary(entry) for entry in declared}
     weights: dict[str, list[str]] = {}
     for entry in declared:
-        weights |= weights_beside(entry)
+        # Several packages may have weights for one domain, and one package many priors.
+        for domain, found in weights_beside(entry).items():
+            weights[domain] = sorted({*weights.get(domain, ()), *found})
     if as_json:
         print_json({"domains": domains, "planners": planners, "priors": priors, "weights": weights})
         return
