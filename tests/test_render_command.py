@@ -263,6 +263,17 @@ def test_mp4(tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == ["a.mp4"]
 
 
+def test_an_mp4_of_odd_pictures_is_even_and_says_nothing(tmp_path, capfd, caplog):
+    ffmpeg = pytest.importorskip("imageio_ffmpeg")
+    odd = (np.full((81, 101, 3), 40 * i, dtype=np.uint8) for i in range(4))
+    film = write_film(odd, tmp_path / "a.mp4")
+    frames = ffmpeg.read_frames(str(film))
+    assert next(frames)["size"] == (102, 82)
+    frames.close()
+    assert capfd.readouterr() == ("", "")
+    assert caplog.records == []
+
+
 def test_without_ffmpeg_an_mp4_is_refused_with_the_remedy(tmp_path, monkeypatch):
     def missing(name):
         raise ImportError(name)
@@ -294,6 +305,9 @@ def test_names_that_cannot_be_written_are_refused_before_anything_is_drawn(tmp_p
     for name, expected in refused.items():
         with pytest.raises(InputError, match=expected):
             check_film(tmp_path / name)
+    for name in (".", "..", "/"):
+        with pytest.raises(InputError, match="name of its own"):
+            check_film(name)
     with pytest.raises(InputError, match="frames only"):
         write_film(pictures(), tmp_path / "mine")
     assert (tmp_path / "mine" / "thesis.txt").read_text() == "precious"
@@ -340,6 +354,7 @@ def test_the_command_draws_what_has_no_plan(tmp_path):
         (["--exploded", "x.jpg"], ".svg"),
         (["--exploded", "x.png", "--size", "big"], "--size"),
         (["--exploded", "x.png", "--size", "0x0"], "--size"),
+        (["--exploded", "x.svg", "--size", "640x480"], "--size with a film or a .png"),
         (["--exploded", "x.png", "--from", "up"], "--from"),
         (["--exploded", "x.png", "--problem", "999"], "0 to 239"),
         (["--plan", "PLAN", "--exploded", "x.png", "--problem", "1"], "either --plan"),

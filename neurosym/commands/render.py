@@ -77,6 +77,8 @@ def render(
         check_film(out)
     if exploded is not None and exploded.suffix.lower() not in STILLS:
         raise InputError(f"Expected --exploded with a file that ends in {', '.join(STILLS)}; got {str(exploded)!r}.")
+    if size is not None and out is None and exploded is not None and exploded.suffix.lower() != ".png":
+        raise InputError(f"Expected --size with a film or a .png; {exploded} is as wide as a column of print.")
     camera = seen_from = None
     if view is not None:
         pattern = r"(-?\d+(?:\.\d+)?),(-?\d+(?:\.\d+)?)"

@@ -28,7 +28,8 @@ def write_film(pictures: Iterator[Picture], out: str | Path) -> Path:
     """Write pictures as a film, whole or not at all.
 
     Args:
-        pictures: uint8 (height, width, 3) each, all of one size, heights and widths even.
+        pictures: uint8 (height, width, 3) each, all of one size. An .mp4 repeats the last row or column where their
+            number is odd: video has even ones.
         out: ends in .gif or .mp4; anything else is a folder, which is to be new, empty or made by this function, for
             frame-0000.png, frame-0001.png and so on.
 
@@ -84,6 +85,8 @@ def _write_mp4(pictures: Iterator[Picture], path: Path) -> Path:
     with replacing(path) as temporary:
         try:
             for picture in pictures:
+                height, width = picture.shape[:2]
+                picture = np.pad(picture, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")
                 if writer is None:
                     height, width = picture.shape[:2]
                     # yuv420p is what every player reads; sizes are even, so nothing needs to be scaled.
@@ -112,6 +115,8 @@ def _ffmpeg() -> Any:
 
 
 def _check_folder(path: Path) -> None:
+    if path.name in ("", ".."):
+        raise InputError(f"Expected a folder of a name of its own, which is replaced as a whole; got {str(path)!r}.")
     if (path.suffix or path.exists()) and not path.is_dir():
         raise InputError(f"Expected a film's name to end in {' or '.join(ENDINGS)}, or a folder; got {str(path)!r}.")
     strange = [p.name for p in path.iterdir() if not _is_frame(p.name)] if path.is_dir() else []
