@@ -26,6 +26,9 @@ TILTS = 0.005
 #: Bullet limits friction along two axes separately: on their diagonal it allows so many times as much.
 DIAGONAL = 1.41
 
+#: What is pressed together overlaps a little in Bullet, and wedged parts then stand at a little less friction yet.
+WEDGED = 1.5
+
 
 @dataclass(frozen=True)
 class Comparison:
@@ -78,6 +81,8 @@ def reason(problem: ns.Problem, order: tuple[str, ...], checked: ns.Validation, 
             return "balances on the very rim of what carries it; geometry asks for 2% more"
         if stands(world, left, friction=DIAGONAL * world.friction):
             return "stands by friction at its limit: Bullet allows up to 1.41 of it on diagonals (a box, not a cone)"
+        if stands(world, left, friction=WEDGED * world.friction):
+            return f"stands by friction just beyond that ({WEDGED} of it): wedged parts overlap a little in Bullet"
         return "geometry: falls; Bullet holds it"
     if seen.in_the_way:
         return "what earlier steps had shifted, by less than counts as moved, is in the way"

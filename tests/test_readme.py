@@ -71,6 +71,16 @@ def test_the_numbers_on_the_first_screen_are_those_of_the_reports(readme):
         assert re.search(rf"^\| swap-repair \| {row} \| 120/120 \| {share} \|", readme, re.MULTILINE), row
 
 
+@pytest.mark.parametrize("page", ["README.md", "docs/limits.md", "docs/results-overview.md"])
+def test_how_many_plans_stood_still_in_physics_is_what_the_report_says(page):
+    row = "planned, accepted by `validate`"
+    report = (ROOT / "docs" / "replay.md").read_text(encoding="utf-8")
+    _, n, same, _ = (c.strip() for c in next(x for x in report.splitlines() if row in x).split("|")[1:-1])
+    said = " ".join((ROOT / page).read_text(encoding="utf-8").split())
+    stood = same.split()[0]
+    assert f"{n} plans for Soma cubes, {stood} stood still" in said or f"{stood} of {n} plans for Soma cubes" in said
+
+
 def test_the_small_table_is_that_of_the_results(readme):
     """Whole sequences: in the tables of the towers that were seen, and that were not; of heights; and of words."""
     where = (

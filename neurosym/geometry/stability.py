@@ -103,6 +103,7 @@ class Stability:
         self._answers: dict[tuple[int, int], Standing] = {}
         self._forces: OrderedDict[tuple[int, int], Array] = OrderedDict()
         self._falls: deque[tuple[int, int]] = deque(maxlen=_KEPT_FALLS)
+        self._whole_asked = False
 
     def standing(self, subset: int, held: int = 0) -> Standing:
         """Whether the parts in a bitset stand while those in `held` and the fixed parts cannot move."""
@@ -184,7 +185,13 @@ class Stability:
         return self.by_program(subset, held)
 
     def _similar(self, subset: int, held: int) -> Array | None:
-        """Forces of the most similar subset that stood, float64 (all corners, CONE_EDGES)."""
+        """Forces of the most similar subset that stood, float64 (all corners, CONE_EDGES).
+
+        The first question is preceded by that about the whole: most subsets are what is left of it.
+        """
+        if not self._whole_asked:
+            self._whole_asked = True
+            self.standing((1 << len(self.assembly)) - 1)
         if not self._forces:
             return None
         nearest = min(self._forces, key=lambda k: (k[0] ^ subset).bit_count() + (k[1] ^ held).bit_count())
@@ -193,39 +200,51 @@ class Stability:
 
     def _near(self, question: _Question, start: Array, held: int) -> Standing | None:
         """An answer from what is near the parts that forces of a similar subset leave unbalanced, if there is one."""
-        whole, n = self.equilibrium, len(self.assembly)
+        whole = self.equilibrium
         weights = whole.weights[question.parts]
-        left = weights - whole.wrenches(question.corners, start[question.corners], n)[question.parts]
+        left = weights - whole.wrenches(question.corners, start[question.corners], len(self.assembly))[question.parts]
         unbalanced = sum(1 << int(p) for p in question.parts[np.abs(left).max(axis=1) > BALANCE])
         if not unbalanced:
             self.asked["kept"] += 1
             forces = start[question.corners]
             return self._stood(question, forces, held)
-        # All others immovable: if these parts fall even so, they fall. What was only relieved of a load hardly does.
-        near = self._question(question.subset, self._with_ring(unbalanced, question.movable))
-        if len(near.parts) < len(question.parts) and left[:, 2].max() > BALANCE:
-            balance = whole.balance(near.parts, near.corners, whole.weights[near.parts])
-            fallen = self._proved_fall(near, balance) if not balance.stands else 0
-            if fallen:
+        # What has lost a support is asked first whether it falls, what was relieved of a load whether it stands.
+        lost = float(left[:, 2].max()) > BALANCE
+        for ask in (self._falls_near, self._stands_near) if lost else (self._stands_near, self._falls_near):
+            answer = ask(question, start, unbalanced, held)
+            if answer is not None:
                 self.asked["near"] += 1
-                return self._fell(question.subset, fallen, held)
-        # All other forces as they are: if those about a path to the ground can be changed to balance, all is balanced.
-        strip = self._with_ring(self._carriers(question, start, unbalanced), question.movable)
-        if 2 * strip.bit_count() < len(question.parts):
-            inner = self._question(question.subset, strip)
-            moves = np.ones(n + 1, dtype=bool)
-            moves[question.parts] = False
-            moves[inner.parts] = True  # True: in the strip, or immovable
-            open_ = moves[whole.a[inner.corners]] & moves[whole.b[inner.corners]]
-            edge, corners = inner.corners[~open_], inner.corners[open_]
-            target = whole.weights[inner.parts] - whole.wrenches(edge, start[edge], n)[inner.parts]
-            balance = whole.balance(inner.parts, corners, target, start[corners], QUICK[1:])
-            if balance.stands:
-                self.asked["near"] += 1
-                forces = start.copy()
-                forces[corners] = balance.forces
-                return self._stood(question, forces[question.corners], held)
+                return answer
         return None
+
+    def _falls_near(self, question: _Question, start: Array, unbalanced: int, held: int) -> Standing | None:
+        """All others immovable: if these parts fall even so, they fall."""
+        near = self._question(question.subset, self._with_ring(unbalanced, question.movable))
+        if len(near.parts) == len(question.parts):
+            return None
+        balance = self.equilibrium.balance(near.parts, near.corners, self.equilibrium.weights[near.parts])
+        fallen = self._proved_fall(near, balance) if not balance.stands else 0
+        return self._fell(question.subset, fallen, held) if fallen else None
+
+    def _stands_near(self, question: _Question, start: Array, unbalanced: int, held: int) -> Standing | None:
+        """All other forces as they are: if those about a path to the ground can balance what is left, all stands."""
+        whole = self.equilibrium
+        strip = self._with_ring(self._carriers(question, start, unbalanced), question.movable)
+        if 2 * strip.bit_count() >= len(question.parts):
+            return None
+        inner = self._question(question.subset, strip)
+        moves = np.ones(len(self.assembly) + 1, dtype=bool)
+        moves[question.parts] = False
+        moves[inner.parts] = True  # True: in the strip, or immovable
+        open_ = moves[whole.a[inner.corners]] & moves[whole.b[inner.corners]]
+        edge, corners = inner.corners[~open_], inner.corners[open_]
+        target = whole.weights[inner.parts] - whole.wrenches(edge, start[edge], len(self.assembly))[inner.parts]
+        balance = whole.balance(inner.parts, corners, target, start[corners], QUICK[1:])
+        if not balance.stands:
+            return None
+        forces = start.copy()
+        forces[corners] = balance.forces
+        return self._stood(question, forces[question.corners], held)
 
     def _with_ring(self, parts: int, among: int) -> int:
         """Parts, and those that touch them."""
