@@ -279,10 +279,19 @@ def test_friction_holds_a_wedge_only_when_there_is_enough():
         assert assembly.stability().standing(0b11).stands is stays
 
 
+def test_friction_beyond_what_numbers_can_tell_apart_is_answered():
+    cells = {"low": [(0, 0, 0)], "high": [(0, 0, 1)], "side": [(1, 0, 1)]}
+    stability = ns.Assembly.from_cells(cells, friction=1e9).stability()
+    assert stability.standing(0b011).stands
+    assert not stability.standing(0b111).stands
+
+
 @pytest.mark.parametrize(
     ("make", "says"),
     [
         (lambda: ns.Assembly.from_cells({}), "at least one part"),
+        (lambda: ns.Assembly.from_cells({"a": [(0, 0, 0)]}, friction=float("nan")), "friction of 0 or more"),
+        (lambda: ns.Assembly.from_cells({"a": [(0, 0, 0)]}, friction=-0.1), "friction of 0 or more"),
         (lambda: ns.Assembly.from_cells({"a": []}), "empty"),
         (lambda: ns.Assembly.from_cells({"a": [(0, 0, 0), (0, 0, 0)]}), "twice"),
         (lambda: ns.Assembly.from_cells({"a": [(0, 0, 0)], "b": [(0, 0, 0)]}), "overlap"),

@@ -267,6 +267,14 @@ def test_cubes_are_judged_by_the_rule_of_the_paper():
     assert failed.failed_at == ns.validate(problem, bad).failed_at
 
 
+@pytest.mark.parametrize("friction", [-0.1, float("nan"), float("inf")])
+def test_friction_is_a_number_of_0_or_more(friction, plan_file, capfd):
+    with pytest.raises(InputError, match="friction of 0 or more"):
+        Physics(friction=friction)
+    assert call("replay", plan_file, f"--friction={friction}") != 0
+    assert "Traceback" not in capfd.readouterr().err
+
+
 @pytest.mark.parametrize("bodies", ["rigid", "cubes"])
 def test_a_window_is_told_of_every_time_step(bodies, monkeypatch):
     ticks, steps, world_step = [], [], World.step

@@ -71,6 +71,8 @@ class Assembly:
         twice = sorted({n for n in names if names.count(n) > 1})
         if twice:
             raise AssemblyError(f"Expected each part name once; got twice: {', '.join(twice)}. Rename one.")
+        if not (isinstance(self.friction, int | float | np.number) and 0.0 <= self.friction < np.inf):
+            raise AssemblyError(f"Expected a coefficient of friction of 0 or more; got {self.friction!r}.")
         for name in self.fixed:
             if name not in names:
                 raise UnknownNameError("fixed part", name, names)

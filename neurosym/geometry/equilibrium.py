@@ -205,7 +205,10 @@ class _Newton:
                 break
             # With no force at all every edge is on the verge of carrying one.
             active = f > 0 if f.any() else np.ones(f.shape, dtype=bool)
-            step = -self._solve(active, weight, gradient)
+            try:
+                step = -self._solve(active, weight, gradient)
+            except RuntimeError:
+                break  # rounding: beside forces this large the proximal term is nothing, and the system is singular
             if not float(gradient @ step) < 0:
                 break  # rounding: no better point can be told from this one
             push = (self.BT @ step).reshape(-1, 3) @ self.edges

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from math import inf
+
+from neurosym.errors import InputError
 
 #: A body of a world: the part's name, and which of its pieces (always 0 for whole parts).
 BodyKey = tuple[str, int]
@@ -38,6 +41,10 @@ class Physics:
     time_step: float = 1 / 240
     solver_iterations: int = 50
     clearance: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.friction is not None and not 0.0 <= self.friction < inf:
+            raise InputError(f"Expected a coefficient of friction of 0 or more, or None; got {self.friction!r}.")
 
 
 @dataclass(frozen=True, slots=True)
