@@ -14,10 +14,10 @@ from neurosym.simulation.window import Shown
 
 Array = NDArray[np.float64]
 
-#: Numbers of the arm's seven joints, the two fingers, the hand, and the point between the fingertips.
+#: Numbers of the arm's seven joints, the two fingers, and the point between the fingertips.
 JOINTS = tuple(range(7))
 FINGERS = (9, 10)
-HAND, TOOL = 8, 11
+TOOL = 11
 #: Upright, elbow bent, hand above the table in front of the arm, fingers pointing down (radians).
 HOME = np.array([0.0, -0.55, 0.0, -2.35, 0.0, 1.8, 0.785])
 #: How far the fingers open, both together.
