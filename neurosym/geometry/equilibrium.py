@@ -46,8 +46,8 @@ PROOF = 10.0
 
 #: Weights of the proximal term, step by step: the first few, and those that follow where these do not decide. Each is
 #: a tenth of the one before at the least: larger leaps cost Newton's method more steps than they save.
-QUICK = (1e-2, 1e-3, 1e-4)
-THOROUGH = (1e-4, 1e-5, 1e-5, 1e-6, 1e-6, 1e-7, 1e-8)
+QUICK = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
+THOROUGH = (1e-6, 1e-7, 1e-8)
 _NEWTON_STEPS = 100
 
 #: A line search ends where the slope is this share of what it was, or after so many steps.
