@@ -61,6 +61,8 @@ def read_plan(path: str | Path) -> SavedPlan:
                 f"Expected steps in {path} that are actions of {problem.name!r}; got {step['action']!r}, and there are "
                 f"{', '.join(problem.actions)}."
             )
+    if document["plan"] != [step["action"] for step in steps]:
+        raise InputError(f'Expected the same actions, in the same order, in "plan" and "steps" of {path}; they differ.')
     return SavedPlan(problem, tuple(s["action"] for s in steps), tuple(map(_how, steps)), document)
 
 

@@ -616,7 +616,7 @@ def test_a_file_is_saved_whole_or_not_at_all(tmp_path: Path):
     path = tmp_path / "a.json"
     ns.Assembly.from_cells({"a": [(0, 0, 0)]}).save(path)
     before = path.read_bytes()
-    broken = ns.Assembly.from_cells({"a": [(0, 0, 0)]}, friction=float("nan"))
+    broken = ns.Assembly.from_cells({"a": [(0, 0, 0)]}, table=float("nan"))
     with pytest.raises(ValueError, match="JSON"):
         broken.save(path)
     assert path.read_bytes() == before

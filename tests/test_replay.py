@@ -396,6 +396,16 @@ def test_the_command_reports_each_step(plan_file, tmp_path, capfd):
     assert open_clients() == before
 
 
+def test_names_in_brackets_are_names(tmp_path, capfd):
+    cells, out = tmp_path / "cells.json", tmp_path / "plan.json"
+    cells.write_text(json.dumps({"[bold]q[/bold]": [[0, 0, 0]], "[/x]": [[0, 0, 1]]}))
+    assert call("plan", "soma", "--cells", cells, "--out", out) == 0
+    assert call("replay", out) == 0
+    said = capfd.readouterr().out
+    assert "[/x]" in said
+    assert "[bold]q[/bold]" in said
+
+
 def test_the_command_says_when_something_moved(tmp_path, capfd):
     cells = tmp_path / "cells.json"
     cells.write_text(json.dumps({"post": [[0, 0, 0]], "top": [[0, 0, 1]]}))
@@ -404,6 +414,7 @@ def test_the_command_says_when_something_moved(tmp_path, capfd):
     cells.unlink()  # the pieces travel with their plan
     document = json.loads(path.read_text())
     document["steps"].reverse()
+    document["plan"].reverse()
     path.write_text(json.dumps(document))
     capfd.readouterr()
     assert call("replay", path) == 1

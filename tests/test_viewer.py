@@ -663,6 +663,24 @@ def test_a_plan_is_opened_as_it_was_made(plan_file):
     assert source.query.options["collapse"] == "rigid"
 
 
+def test_a_plan_that_was_edited_is_not_shown_as_one_that_holds(plan_file, tmp_path):
+    document = json.loads(plan_file.read_text())
+    turned = {**document, "plan": document["plan"][::-1], "steps": document["steps"][::-1]}
+    edited = tmp_path / "edited.json"
+    edited.write_text(json.dumps(turned))
+    shown = Shown.saved(open_source(Query(str(edited))).saved)
+    assert not shown.search.solved
+    assert "does not hold" in shown.search.sentence
+    edited.write_text(json.dumps({**document, "plan": document["plan"][:2]}))
+    with pytest.raises(ns.InputError, match="the same actions"):
+        open_source(Query(str(edited)))
+
+
+def test_a_number_does_not_go_with_a_file(plan_file):
+    with pytest.raises(ns.InputError, match="it is a file or a folder"):
+        open_source(Query(str(plan_file), 3))
+
+
 def test_a_prior_that_is_gone_leaves_a_note(plan_file):
     document = json.loads(plan_file.read_text()) | {"prior": "gone.safetensors"}
     plan_file.write_text(json.dumps(document))
@@ -954,8 +972,7 @@ def test_parts_are_seen_in_their_own_colours(tab, viewer, shown):
         pale = float((chroma < 0.28 * seen.max(axis=1))[coloured].mean()) if coloured.any() else 1.0
         return max(float(np.abs(seen - colour).max(axis=1).min()) for colour in own), pale
 
-    until(lambda: off()[0] < 40)
-    assert off()[1] < 0.03
+    until(lambda: np.less(off(), (40, 0.03)).all())
     viewer.slider.value = 0.0
 
 

@@ -71,13 +71,14 @@ def replay(
 
 
 def _show(name: str, report: ReplayReport) -> None:
+    from rich.markup import escape
     from rich.table import Table
 
     came = bool(report.steps) and all(step.arrives for step in report.steps)
     way = "pulled along by a grip" if report.pulled else f"{'placed' if came else 'taken'} by hand"
     what = "rigid parts" if report.bodies == "rigid" else "independent cubes"
     under = "" if report.gravity else ", no gravity"
-    table = Table(title=f"{name}: {what}, {way}{under}", title_justify="left")
+    table = Table(title=escape(f"{name}: {what}, {way}{under}"), title_justify="left")
     table.add_column("step", justify="right")
     table.add_column("action")
     table.add_column(f"largest shift{f' ({report.unit})' if report.unit else ''}", justify="right")
@@ -86,7 +87,7 @@ def _show(name: str, report: ReplayReport) -> None:
     for number, step in enumerate((report.start, *report.steps)):
         # Less than this is what numbers are rounded to.
         shift = step.displacement if step.displacement > 1e-6 * report.threshold else 0.0
-        table.add_row(str(number), _did(step), f"{shift:.2g}", f"{step.share:.2%}", _rest(step))
+        table.add_row(str(number), escape(_did(step)), f"{shift:.2g}", f"{step.share:.2%}", escape(_rest(step)))
     console(table).print(table)
     limit = f"{report.threshold:.3g} {report.unit or ''}".strip()
     failed = report.failed_at

@@ -119,7 +119,7 @@ def view(
 def _serve(source: Source, shown: Shown | None, *, host: str, port: int, browser: bool) -> None:
     """Show the page until the keyboard ends it."""
     from neurosym.viewer.page import Page
-    from neurosym.viewer.server import LocalServer
+    from neurosym.viewer.server import LOOPBACKS, LocalServer
 
     server = LocalServer(host, port, "neurosym")
     page = Page(server, source.query, source.given)
@@ -128,10 +128,10 @@ def _serve(source: Source, shown: Shown | None, *, host: str, port: int, browser
             page.plan(source.query, source.problem)
         else:
             page.show(shown)
-        where = "localhost" if host in ("0.0.0.0", "::") else host
+        where = "localhost" if host in ("0.0.0.0", "::") else f"[{host}]" if ":" in host else host
         address = f"http://{where}:{server.get_port()}"
         print(f"{address} shows {source.problem.name}. Ctrl+C ends it.", flush=True)
-        if host != LOOPBACK:
+        if host not in LOOPBACKS:
             say(f"Note: {host} is not this machine alone; who reaches the page can plan with it.")
         if browser:
             webbrowser.open(address)

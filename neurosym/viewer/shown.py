@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from neurosym.pipeline import advice
 from neurosym.planner import PlanResult, Refusal, Status
 from neurosym.prior import OrderScores
 from neurosym.problem import Step
+from neurosym.validation import validate
 from neurosym.viewer.timeline import Timeline
 
 if TYPE_CHECKING:
@@ -168,7 +169,21 @@ class Shown:
             scores = advice(saved.problem, saved.document.get("prior"))
         except REFUSED as error:
             notes.append(f"The prior's scores are not shown: {error}")
-        return cls.of(saved.problem, Search.saved(saved, scores), tuple(notes))
+        return cls.of(saved.problem, _checked(saved, Search.saved(saved, scores)), tuple(notes))
+
+
+def _checked(saved: SavedPlan, search: Search) -> Search:
+    """The search that a file tells of; where its plan does not hold, by geometry asked afresh, that is said instead.
+
+    Plans that a simulation allowed are left to it (`neurosym replay`).
+    """
+    if not search.solved or saved.document.get("oracle", "geometry") != "geometry":
+        return search
+    checked = validate(saved.problem, saved.plan, saved.how)
+    if checked.ok:
+        return search
+    sentence = f"The file has a plan, but it does not hold. {checked.reason}"
+    return replace(search, status=Status.GAVE_UP, sentence=sentence)
 
 
 def _ways(problem: Problem, search: Search) -> tuple[Any, ...]:

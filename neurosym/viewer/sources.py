@@ -59,6 +59,9 @@ def open_source(query: Query, cells: Mapping[str, Any] | None = None, reading: R
             return _assembly_at(path, query, reading)
         _refuse(reading, "a plan's file says how its assembly is read")
         return _plan_at(path, query)
+    if query.domain not in domain_names() and path.exists():
+        what = "a number (--problem)" if cells is None else "cells"
+        raise InputError(f"Expected no {what} with {query.domain!r}: it is a file or a folder, not a problem family.")
     _refuse(reading, f"{query.domain!r} is a problem family")
     if query.domain not in domain_names():
         hint = f"There is no file or folder {query.domain!r} either."
