@@ -83,6 +83,9 @@ def reason(problem: ns.Problem, order: tuple[str, ...], checked: ns.Validation, 
             return "stands by friction at its limit: Bullet allows up to 1.41 of it on diagonals (a box, not a cone)"
         if stands(world, left, friction=WEDGED * world.friction):
             return f"stands by friction just beyond that ({WEDGED} of it): wedged parts overlap a little in Bullet"
+        shifted = max((s.displacement for s in report.steps[:step]), default=0.0)
+        if shifted > TILTS:
+            return f"what earlier steps had shifted, by {shifted:.2f}, less than counts as moved, holds it"
         return "geometry: falls; Bullet holds it"
     if seen.in_the_way:
         return "what earlier steps had shifted, by less than counts as moved, is in the way"
