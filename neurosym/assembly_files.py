@@ -50,6 +50,16 @@ class Reading:
         """What was asked for, and nothing else."""
         return {name: value for name, value in asdict(self).items() if value is not None}
 
+    def refuse(self, because: str) -> None:
+        """Refuse what was asked for where there are no files that it could be asked of.
+
+        Raises:
+            InputError: anything was; the message has its names, and `because`.
+        """
+        given = self.as_json()
+        if given:
+            raise InputError(f"Expected {', '.join(given)} only with the files of an assembly; {because}.")
+
     @classmethod
     def from_json(cls, said: Mapping[str, Any]) -> Reading:
         """The inverse of `as_json`; other entries are not looked at."""

@@ -12,7 +12,7 @@ from neurosym.weights_header import read_header
 
 
 def summary(entry: EntryPoint) -> str:
-    """The first sentence of the docstring of what an entry point names, read from its source; else where it is."""
+    """The first paragraph of the docstring of what an entry point names, read from its source; else where it is."""
     source = _source(entry.module)
     if source is None:
         return entry.value

@@ -71,16 +71,6 @@ class FileOptions:
 
         return Reading(**{**vars(self), "up": None if self.up is None else self.up.value})
 
-    def refuse_for(self, family: str) -> None:
-        """Say that a problem family has no files to read, if any of them was given.
-
-        Raises:
-            InputError: one was.
-        """
-        for name, value in vars(self).items():
-            if value is not None:
-                raise InputError(f"Expected --{name} with the files of an assembly; {family!r} is a problem family.")
-
 
 @dataclass(frozen=True)
 class RemovalOptions:

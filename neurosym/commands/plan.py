@@ -109,7 +109,7 @@ def plan(
     options |= removal.given() | family_options(option)
     source: dict[str, Any] = {}
     if path is None:
-        files.refuse_for(what)
+        files.reading().refuse(f"{what!r} is a problem family")
         problem = _problem(family, number, cells, options)
         # Pieces of the user's own travel with their plan, so that it can be shown and replayed.
         source = {} if cells is None else {"cells": cells_in(cells)}

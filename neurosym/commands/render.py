@@ -133,7 +133,7 @@ def _at_rest(what: str, number: int | None, files: FileOptions, options: dict[st
     if what not in domain_names() and Path(what).exists():
         assembly = load_assembly(Path(what), files)
         return Staging(assembly, assembly.names, ()), Path(what).resolve().name
-    files.refuse_for(what)
+    files.reading().refuse(f"{what!r} is a problem family")
     problem = load_domain(what).problem(number or 0, **options)
     world = problem.world if isinstance(problem.world, Assembly) else getattr(problem.world, "assembly", None)
     if not isinstance(world, Assembly):

@@ -57,12 +57,12 @@ def open_source(query: Query, cells: Mapping[str, Any] | None = None, reading: R
     if path.exists() and query.number is None and cells is None:
         if not _is_plan(path):
             return _assembly_at(path, query, reading)
-        _refuse(reading, "a plan's file says how its assembly is read")
+        reading.refuse("a plan's file says how its assembly is read")
         return _plan_at(path, query)
     if query.domain not in domain_names() and path.exists():
         what = "a number (--problem)" if cells is None else "cells"
         raise InputError(f"Expected no {what} with {query.domain!r}: it is a file or a folder, not a problem family.")
-    _refuse(reading, f"{query.domain!r} is a problem family")
+    reading.refuse(f"{query.domain!r} is a problem family")
     if query.domain not in domain_names():
         hint = f"There is no file or folder {query.domain!r} either."
         raise UnknownNameError("domain", query.domain, domain_names(), hint=hint)
@@ -70,12 +70,6 @@ def open_source(query: Query, cells: Mapping[str, Any] | None = None, reading: R
         return _puzzle(query, cells)
     query = replace(query, number=query.number or 0)
     return Source(query, problem_maker(query, {})(), {})
-
-
-def _refuse(reading: Reading, because: str) -> None:
-    given = reading.as_json()
-    if given:
-        raise InputError(f"Expected {', '.join(given)} with the files of an assembly; {because}.")
 
 
 def _puzzle(query: Query, cells: Mapping[str, Any]) -> Source:
