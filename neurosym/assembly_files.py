@@ -51,14 +51,14 @@ class Reading:
         return {name: value for name, value in asdict(self).items() if value is not None}
 
     def refuse(self, because: str) -> None:
-        """Refuse what was asked for where there are no files that it could be asked of.
+        """Refuse what the command line was asked for where there are no files that it could be asked of.
 
         Raises:
             InputError: anything was; the message has its names, and `because`.
         """
-        given = self.as_json()
+        given = [f"--{name}" for name in self.as_json()]
         if given:
-            raise InputError(f"Expected {', '.join(given)} only with the files of an assembly; {because}.")
+            raise InputError(f"Expected {', '.join(given)} with the files of an assembly; {because}.")
 
     @classmethod
     def from_json(cls, said: Mapping[str, Any]) -> Reading:
