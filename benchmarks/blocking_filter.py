@@ -8,8 +8,8 @@ import time
 import numpy as np
 
 import neurosym as ns
-from neurosym.geometry.blocking import bits
-from neurosym.geometry.sweep import exits_along
+from neurosym.geometry.blocking.sweep import exits_along
+from neurosym.support.bitsets import bits
 
 #: One question to the table is shorter than a clock is exact.
 REPEATS = 100

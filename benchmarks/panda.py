@@ -19,7 +19,7 @@ import numpy as np
 
 import neurosym as ns
 from domains.tower_variants import towers
-from neurosym.motions import stage
+from neurosym.planning.staging import stage
 from neurosym.simulation.panda import BuildReport, BuildSettings, build_with_panda
 
 

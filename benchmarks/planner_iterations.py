@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from neurosym.benchmark import NO_PRIOR, Comparison, Outcome, run
-from neurosym.engines import cores
+from neurosym.experiments.benchmark import NO_PRIOR, Comparison, Outcome, run
+from neurosym.experiments.engines import cores
+from neurosym.experiments.reporting import rows
 from neurosym.registry import load_domain
-from neurosym.reporting import rows
 
 PRIORS = (NO_PRIOR, "tcn-paper", "sinkhorn-paper", "tcn", "sinkhorn")
 numbers = tuple(load_domain("soma").numbers("test"))

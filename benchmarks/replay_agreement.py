@@ -15,8 +15,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 import neurosym as ns
-from neurosym.files import write_text
 from neurosym.simulation import ReplayReport, replay_plan
+from neurosym.support.files import write_text
 
 #: Patches shrunk by so much instead of by 2%: what then falls balanced on the rim of what carries it.
 RIM = 0.15

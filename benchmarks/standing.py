@@ -17,7 +17,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import numpy as np
 
 import neurosym as ns
-from neurosym.geometry.blocking import bits
+from neurosym.support.bitsets import bits
 
 DATA = Path(__file__).parents[2] / "shared" / "data"
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from neurosym.geometry.assembly import Assembly
-from neurosym.motions import Staging, steps_in_space
+from neurosym.planning.staging import Staging, steps_in_space
 from neurosym.viewer.scene import PlanScene
 from neurosym.viewer.server import LocalServer
 from neurosym.viewer.timeline import Timeline, part_bounds

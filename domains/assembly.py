@@ -17,11 +17,11 @@ from domains.assembly_groups import apart_in_groups
 from domains.assembly_removal import apart_one_by_one
 from domains.assembly_samples import SAMPLES, TRAINING, sample
 from neurosym.errors import AssemblyError, InputError, UnknownNameError
-from neurosym.family import ProblemFamily
 from neurosym.geometry.assembly import NO_TABLE, Assembly
-from neurosym.geometry.directions import Directions, directions_for
+from neurosym.geometry.blocking.directions import Directions, directions_for
 from neurosym.language import Domain, Problem
 from neurosym.language.domain import as_names
+from neurosym.planning.problem_family import ProblemFamily
 
 #: What `paths` may be.
 PATHS = ("straight", "any")

@@ -27,13 +27,13 @@ from domains.assembly_splits import Block, Splitter
 from domains.assembly_why import explain_groups
 from neurosym.errors import InputError
 from neurosym.geometry.assembly import Assembly
-from neurosym.geometry.blocking import bits
+from neurosym.geometry.step_motion import Way
 from neurosym.language import Action, Domain, Fluent, GroundProblem, Problem, Type
-from neurosym.planner import PlanResult, Status
-from neurosym.problem import Rejection, Step, Verdict
-from neurosym.validation import Validation
-from neurosym.ways import Way
-from neurosym.why_not import WhyNot, listed
+from neurosym.language.search_problem import Rejection, Step, Verdict
+from neurosym.planning.explanation import WhyNot, listed
+from neurosym.planning.planner import PlanResult, Status
+from neurosym.planning.validation import Validation
+from neurosym.support.bitsets import bits
 
 if TYPE_CHECKING:
     from domains.assembly import Setting

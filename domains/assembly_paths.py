@@ -8,13 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from neurosym.geometry.assembly import Assembly
-from neurosym.geometry.blocking import bits
-from neurosym.geometry.grid import GridCells, cells_of
-from neurosym.geometry.voxel_moves import Separation, Stuck, first_separation, separation_path
-from neurosym.ways import Way
-from neurosym.why_not import listed
+from neurosym.geometry.paths.grid import GridCells, cells_of
+from neurosym.geometry.paths.voxel_moves import Separation, Stuck, first_separation, separation_path
+from neurosym.geometry.step_motion import Way
+from neurosym.planning.explanation import listed
+from neurosym.support.bitsets import bits
 
-#: Poses and ways that each kind of search may ask for one way out (`neurosym.geometry.extraction`): seconds, mostly.
+#: Poses and ways that each kind of search may ask for one way out (`geometry.paths.extraction`): seconds, mostly.
 MAX_CHECKS = 100_000
 
 #: States that the exact search over moves of groups may visit for one separation.
@@ -59,7 +59,7 @@ def way_out(assembly: Assembly, moving: int, among: int, *, shifting: bool) -> W
         return _way(cells, found)
 
     def search() -> Way | NoWay:
-        from neurosym.geometry.extraction import KINDS, Failure, extract
+        from neurosym.geometry.paths.extraction import KINDS, Failure, extract
 
         rng = np.random.default_rng([zlib.crc32(f"{moving:x} {among:x}".encode())])
         kinds = KINDS if cells is None else KINDS[:1]  # on cells the lattice is all there is by translations

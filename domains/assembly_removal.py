@@ -10,14 +10,13 @@ import numpy as np
 
 from domains.assembly_paths import NoWay, ground_of, way_out
 from domains.assembly_why import explain_removal, refute_removal
-from neurosym import predicates
 from neurosym.geometry.assembly import Assembly
-from neurosym.geometry.blocking import bits
-from neurosym.geometry.sweep import exits_along
-from neurosym.language import Action, Derived, Domain, Fluent, Problem, Simulation, State, Type, formulas
-from neurosym.problem import Verdict
-from neurosym.ways import Way
-from neurosym.why_not import GROUND, listed
+from neurosym.geometry.blocking.sweep import exits_along
+from neurosym.geometry.step_motion import Way
+from neurosym.language import Action, Derived, Domain, Fluent, Problem, Simulation, State, Type, formulas, predicates
+from neurosym.language.search_problem import Verdict
+from neurosym.planning.explanation import GROUND, listed
+from neurosym.support.bitsets import bits
 
 if TYPE_CHECKING:
     from domains.assembly import Setting

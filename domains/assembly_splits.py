@@ -17,12 +17,12 @@ from typing import TYPE_CHECKING
 
 from domains.assembly_paths import NoWay, grid_of, ground_of, separation, way_out
 from neurosym.geometry.assembly import Assembly
-from neurosym.geometry.blocking import bits
-from neurosym.geometry.sweep import exits_along
-from neurosym.predicates import stands
-from neurosym.problem import Verdict
-from neurosym.ways import Way
-from neurosym.why_not import listed
+from neurosym.geometry.blocking.sweep import exits_along
+from neurosym.geometry.step_motion import Way
+from neurosym.language.predicates import stands
+from neurosym.language.search_problem import Verdict
+from neurosym.planning.explanation import listed
+from neurosym.support.bitsets import bits
 
 if TYPE_CHECKING:
     from domains.assembly import Setting

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 from domains.assembly_paths import NoWay, way_out
 from neurosym.geometry.assembly import Assembly
-from neurosym.geometry.blocking import bits
-from neurosym.planner import PlanResult, Status
-from neurosym.predicates import losses
-from neurosym.problem import Rejection
-from neurosym.ways import Way
-from neurosym.why_not import Blocked, Cycle, Fall, WhyNot, blockers_of, smallest_cycle
+from neurosym.geometry.step_motion import Way
+from neurosym.language.predicates import losses
+from neurosym.language.search_problem import Rejection
+from neurosym.planning.explanation import Blocked, Cycle, Fall, WhyNot, blockers_of, smallest_cycle
+from neurosym.planning.planner import PlanResult, Status
+from neurosym.support.bitsets import bits
 
 if TYPE_CHECKING:
     from domains.assembly import Setting

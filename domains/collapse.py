@@ -5,7 +5,7 @@
             settles down on what is under it.
 ``strict``  nothing may be left over a removed cube.
 ``rigid``   pieces are rigid bodies: one must leave along a straight line that the others and the table leave
-            free, and the rest must stand (`neurosym.predicates.free`, `stable_without`).
+            free, and the rest must stand (`neurosym.language.predicates.free`, `stable_without`).
 
 The first two stand on the blocking graph of the cubes' boxes in the direction down: cube b is over cube a when
 b, moved down, would hit a. Falling keeps every column's order and leaves no gap in it, so the set of pieces
@@ -22,14 +22,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from neurosym.errors import AssemblyError
-from neurosym.geometry import collision
 from neurosym.geometry.assembly import Assembly, Box
-from neurosym.geometry.blocking import bits
-from neurosym.geometry.contacts import TABLE, near_pairs
-from neurosym.geometry.sweep import drops_onto
+from neurosym.geometry.blocking.sweep import drops_onto
+from neurosym.geometry.contact import collision
+from neurosym.geometry.contact.contacts import TABLE, near_pairs
 from neurosym.language import Derived, Fluent, State
 from neurosym.language.formulas import AnyOf, Way
-from neurosym.problem import Verdict
+from neurosym.language.search_problem import Verdict
+from neurosym.support.bitsets import bits
 
 RULES = ("cubes", "strict", "rigid")
 

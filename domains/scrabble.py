@@ -19,11 +19,11 @@ from domains import scrabble_tiles
 from domains.scrabble_demonstrations import demonstrate, picture_seed
 from domains.scrabble_rules import DOMAIN, Reference, all_slots_filled, laid, tile
 from domains.scrabble_tiles import COUNTS, LONGEST, N_TEST, N_TRAIN, SHORTEST, TILES, VALUES
-from neurosym.demonstrations import Demonstrations
 from neurosym.errors import InputError, UnknownNameError
-from neurosym.family import ProblemFamily, Progress
 from neurosym.language import Atom, Problem
-from neurosym.motions import Staging
+from neurosym.planning.demonstrations import Demonstrations
+from neurosym.planning.problem_family import ProblemFamily, Progress
+from neurosym.planning.staging import Staging
 
 #: How many problems of a part are meant where nobody says how many: enough for `compare`, and for its blind baseline.
 DEFAULT_COUNTS = {"train": 50, "test": 200}

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from domains.scrabble_tiles import COUNTS, LONGEST
-from neurosym.demonstrations import Demonstrations
 from neurosym.errors import UnknownNameError
-from neurosym.family import Progress
+from neurosym.planning.demonstrations import Demonstrations
+from neurosym.planning.problem_family import Progress
 
 RECIPES = ("full", "paper")
 

@@ -14,8 +14,8 @@ import PIL
 from numpy.typing import NDArray
 
 from domains.scrabble_drawing import HEIGHT, WIDTH, Style, draw_word, style_named
-from neurosym.family import Progress
-from neurosym.files import replacing
+from neurosym.planning.problem_family import Progress
+from neurosym.support.files import replacing
 
 #: Raise it whenever the same request would give other pixels.
 PICTURE_VERSION = 1

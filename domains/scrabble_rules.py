@@ -9,9 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from neurosym.language import Action, Atom, Domain, Fluent, Type
+from neurosym.language.search_problem import Verdict
 from neurosym.language.state import State
 from neurosym.language.terms import derived
-from neurosym.problem import Verdict
 
 tile = Type("tile")
 laid = Fluent("laid", tile)

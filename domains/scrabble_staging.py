@@ -9,7 +9,7 @@ import numpy as np
 
 from domains.scrabble_drawing import tile_face
 from neurosym.geometry.assembly import Assembly, boxes_part
-from neurosym.motions import Staging, building
+from neurosym.planning.staging import Staging, building
 
 #: A tile: its edges, and from the middle of one slot to that of the next (edges of a tile).
 SIZE, PITCH = (1.0, 1.0, 0.22), 1.04

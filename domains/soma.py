@@ -15,13 +15,12 @@ from numpy.typing import NDArray
 from domains.collapse import RULES, check_cubes, check_overlaps, check_standing, keeps_standing
 from domains.soma_demonstrations import check_seed, demonstrate, picture_seed
 from domains.soma_pieces import LETTERS, Cell, solutions
-from neurosym import predicates
-from neurosym.demonstrations import Demonstrations
 from neurosym.errors import AssemblyError, InputError, UnknownNameError
-from neurosym.family import ProblemFamily, Progress
 from neurosym.geometry.assembly import Assembly
-from neurosym.language import Action, Domain, Fluent, Problem, Simulation, Type
+from neurosym.language import Action, Domain, Fluent, Problem, Simulation, Type, predicates
 from neurosym.language.domain import as_names
+from neurosym.planning.demonstrations import Demonstrations
+from neurosym.planning.problem_family import ProblemFamily, Progress
 
 piece = Type("piece")
 present = Fluent("present", piece)

@@ -19,13 +19,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from domains.soma_pieces import LETTERS, Cell, symmetries, turned
-from neurosym.demonstrations import Demonstrations
 from neurosym.errors import ContractError, InputError, UnknownNameError
-from neurosym.family import Progress
-from neurosym.files import replacing
 from neurosym.geometry.assembly import Assembly
-from neurosym.problem import Step
+from neurosym.language.search_problem import Step
+from neurosym.planning.demonstrations import Demonstrations
+from neurosym.planning.problem_family import Progress
 from neurosym.registry import load_planner
+from neurosym.support.files import replacing
 
 if TYPE_CHECKING:
     from domains.soma import SomaFamily

@@ -19,11 +19,11 @@ from domains.tower_blocks import COLOURS, Block, ReferenceTower
 from domains.tower_demonstrations import demonstrate
 from domains.tower_pictures import draw_offsets, picture_seed, setting_named, take_picture, take_pictures
 from domains.tower_variants import TALLEST, VARIANTS, blocks_of, sequences, split_numbers, towers
-from neurosym.demonstrations import Demonstrations
 from neurosym.errors import AssemblyError, InputError, UnknownNameError
-from neurosym.family import ProblemFamily, Progress
 from neurosym.language import Problem
-from neurosym.motions import Staging, building
+from neurosym.planning.demonstrations import Demonstrations
+from neurosym.planning.problem_family import ProblemFamily, Progress
+from neurosym.planning.staging import Staging, building
 
 
 class TowerFamily(ProblemFamily):

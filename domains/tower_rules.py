@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from domains.tower_blocks import Kind, ReferenceTower
 from neurosym.language import Action, Derived, Domain, Fluent, State, Type
-from neurosym.problem import Verdict
+from neurosym.language.search_problem import Verdict
 
 block = Type("block")
 #: Fluent: the block stands in the tower. How many do says which level is next.

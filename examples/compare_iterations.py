@@ -9,9 +9,9 @@ is one method; here one that asks the geometry itself, which a prior that reads 
 import argparse
 
 import neurosym as ns
-from neurosym.benchmark import Comparison, Outcome, ask_priors, run
+from neurosym.experiments.benchmark import Comparison, Outcome, ask_priors, run
+from neurosym.experiments.reporting import rows
 from neurosym.plotting import iterations_figure, save
-from neurosym.reporting import rows
 
 
 class TallestFirst(ns.Prior):

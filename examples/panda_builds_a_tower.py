@@ -12,7 +12,7 @@ import argparse
 import numpy as np
 
 import neurosym as ns
-from neurosym.motions import stage
+from neurosym.planning.staging import stage
 from neurosym.simulation.film_files import write_film
 from neurosym.simulation.panda import BuildReport, CellFilm, build_with_panda
 

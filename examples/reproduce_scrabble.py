@@ -8,7 +8,7 @@ It shows the share of letters, and of whole words, that each model has right, ag
 
 from pathlib import Path
 
-from neurosym.imitation import Results, Study, reproduce_study, study
+from neurosym.experiments.imitation import Results, Study, reproduce_study, study
 
 
 def main(given: Study, out: str = "out/reproduce-scrabble", **options) -> Results:

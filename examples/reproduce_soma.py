@@ -8,7 +8,7 @@ as `neurosym reproduce soma`; a run that was killed goes on where it was.
 
 from pathlib import Path
 
-from neurosym.reproduce import Experiment, reproduce, soma_experiment
+from neurosym.experiments.reproduce import Experiment, reproduce, soma_experiment
 
 
 def main(given: Experiment, out: str = "out/reproduce-soma", **options) -> dict[str, float]:

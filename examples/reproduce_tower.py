@@ -8,7 +8,7 @@ It shows how often each model has the whole colour sequence right, and how often
 
 from pathlib import Path
 
-from neurosym.imitation import Results, Study, reproduce_study, study
+from neurosym.experiments.imitation import Results, Study, reproduce_study, study
 
 
 def main(given: Study, out: str = "out/reproduce-tower", **options) -> Results:

@@ -8,7 +8,7 @@ shown and guesses the others. The same as `neurosym reproduce unseen`; a run tha
 
 from pathlib import Path
 
-from neurosym.imitation import Results, Study, reproduce_study, study
+from neurosym.experiments.imitation import Results, Study, reproduce_study, study
 
 
 def main(given: Study, out: str = "out/reproduce-unseen", **options) -> Results:

@@ -8,7 +8,7 @@ It shows the share of whole colour sequences, and of right heights, against the 
 
 from pathlib import Path
 
-from neurosym.imitation import Results, Study, reproduce_study, study
+from neurosym.experiments.imitation import Results, Study, reproduce_study, study
 
 
 def main(given: Study, out: str = "out/reproduce-variable", **options) -> Results:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from neurosym.errors import InputError
-from neurosym.weights_header import read_header
+from neurosym.planning.weights_header import read_header
 
 FOLDER = Path(__file__).parent / "weights"
 

@@ -17,8 +17,8 @@ from torch import Tensor
 
 from learned_priors.networks import NetworkConfig, OrderNetwork
 from neurosym.errors import CheckpointError
-from neurosym.files import written_whole
-from neurosym.weights_header import read_header
+from neurosym.planning.weights_header import read_header
+from neurosym.support.files import written_whole
 
 #: Of the header; raised when an older reader would misread a file.
 SCHEMA = 1

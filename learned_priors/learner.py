@@ -16,8 +16,8 @@ from learned_priors.losses import cross_entropy, loss_of, targets_of
 from learned_priors.metrics import whole_order_accuracy
 from learned_priors.networks import Logits, NetworkConfig, OrderNetwork
 from learned_priors.recipes import TrainConfig
-from neurosym.demonstrations import Demonstrations
 from neurosym.errors import InputError
+from neurosym.planning.demonstrations import Demonstrations
 
 #: Pictures prepared, or read, at a time: bounds the memory that float copies of them take.
 CHUNK = 256

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import linear_sum_assignment
 
-from neurosym.prior import OrderScores
+from neurosym.planning.prior import OrderScores
 
 
 def decoded(

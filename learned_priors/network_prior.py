@@ -18,9 +18,9 @@ from learned_priors.metrics import decoded
 from learned_priors.networks import Logits, NetworkConfig, OrderNetwork
 from learned_priors.recipes import RECIPES, Recipe, TrainConfig, recipe_named
 from learned_priors.training import FitProgress, fit
-from neurosym.demonstrations import Demonstrations
 from neurosym.errors import CheckpointError, InputError
-from neurosym.prior import OrderScores, Prior, as_picture_batch
+from neurosym.planning.demonstrations import Demonstrations
+from neurosym.planning.prior import OrderScores, Prior, as_picture_batch
 
 if TYPE_CHECKING:
     from neurosym.language.domain import Problem

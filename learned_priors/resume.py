@@ -16,8 +16,8 @@ from torch import Tensor
 from learned_priors.checkpoints import read_tensors, write_tensors
 from learned_priors.networks import NetworkConfig, OrderNetwork
 from learned_priors.recipes import TrainConfig
-from neurosym.demonstrations import Demonstrations
 from neurosym.errors import CheckpointError
+from neurosym.planning.demonstrations import Demonstrations
 
 _KIND = "training-state"
 

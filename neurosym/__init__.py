@@ -31,8 +31,8 @@ _HOMES = {
         "NeurosymError",
         "UnknownNameError",
     ),
-    "neurosym.demonstrations": ("Demonstrations",),
-    "neurosym.family": ("ProblemFamily",),
+    "neurosym.planning.demonstrations": ("Demonstrations",),
+    "neurosym.planning.problem_family": ("ProblemFamily",),
     "neurosym.geometry.assembly": ("Assembly",),
     "neurosym.language": (
         "Action",
@@ -47,9 +47,9 @@ _HOMES = {
         "derived",
     ),
     "neurosym.pipeline": ("count_plans", "plans", "solve"),
-    "neurosym.planner": ("Budget", "Planner", "PlannerTraits", "PlanResult", "Refusal", "SearchLog", "Status"),
-    "neurosym.prior": ("OrderScores", "Prior", "RandomPrior", "UniformPrior"),
-    "neurosym.problem": ("Rejection", "SearchProblem", "Step", "Verdict"),
+    "neurosym.planning.planner": ("Budget", "Planner", "PlannerTraits", "PlanResult", "Refusal", "SearchLog", "Status"),
+    "neurosym.planning.prior": ("OrderScores", "Prior", "RandomPrior", "UniformPrior"),
+    "neurosym.language.search_problem": ("Rejection", "SearchProblem", "Step", "Verdict"),
     "neurosym.registry": (
         "domain_names",
         "load_domain",
@@ -58,16 +58,14 @@ _HOMES = {
         "planner_names",
         "prior_names",
     ),
-    "neurosym.validation": ("Validation", "validate"),
+    "neurosym.planning.validation": ("Validation", "validate"),
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
-_MODULES = ("predicates",)
+_MODULES = {"predicates": "neurosym.language.predicates"}
 
 __all__ = sorted([*_HOME_OF, *_MODULES, "__version__"])
 
 if TYPE_CHECKING:
-    from neurosym import predicates as predicates
-    from neurosym.demonstrations import Demonstrations as Demonstrations
     from neurosym.errors import (
         AssemblyError as AssemblyError,
     )
@@ -95,7 +93,6 @@ if TYPE_CHECKING:
     from neurosym.errors import (
         UnknownNameError as UnknownNameError,
     )
-    from neurosym.family import ProblemFamily as ProblemFamily
     from neurosym.geometry.assembly import Assembly as Assembly
     from neurosym.language import Action as Action
     from neurosym.language import Atom as Atom
@@ -107,32 +104,35 @@ if TYPE_CHECKING:
     from neurosym.language import State as State
     from neurosym.language import Type as Type
     from neurosym.language import derived as derived
+    from neurosym.language import predicates as predicates
+    from neurosym.language.search_problem import Rejection as Rejection
+    from neurosym.language.search_problem import SearchProblem as SearchProblem
+    from neurosym.language.search_problem import Step as Step
+    from neurosym.language.search_problem import Verdict as Verdict
     from neurosym.pipeline import count_plans as count_plans
     from neurosym.pipeline import plans as plans
     from neurosym.pipeline import solve as solve
-    from neurosym.planner import Budget as Budget
-    from neurosym.planner import Planner as Planner
-    from neurosym.planner import PlannerTraits as PlannerTraits
-    from neurosym.planner import PlanResult as PlanResult
-    from neurosym.planner import Refusal as Refusal
-    from neurosym.planner import SearchLog as SearchLog
-    from neurosym.planner import Status as Status
-    from neurosym.prior import OrderScores as OrderScores
-    from neurosym.prior import Prior as Prior
-    from neurosym.prior import RandomPrior as RandomPrior
-    from neurosym.prior import UniformPrior as UniformPrior
-    from neurosym.problem import Rejection as Rejection
-    from neurosym.problem import SearchProblem as SearchProblem
-    from neurosym.problem import Step as Step
-    from neurosym.problem import Verdict as Verdict
+    from neurosym.planning.demonstrations import Demonstrations as Demonstrations
+    from neurosym.planning.planner import Budget as Budget
+    from neurosym.planning.planner import Planner as Planner
+    from neurosym.planning.planner import PlannerTraits as PlannerTraits
+    from neurosym.planning.planner import PlanResult as PlanResult
+    from neurosym.planning.planner import Refusal as Refusal
+    from neurosym.planning.planner import SearchLog as SearchLog
+    from neurosym.planning.planner import Status as Status
+    from neurosym.planning.prior import OrderScores as OrderScores
+    from neurosym.planning.prior import Prior as Prior
+    from neurosym.planning.prior import RandomPrior as RandomPrior
+    from neurosym.planning.prior import UniformPrior as UniformPrior
+    from neurosym.planning.problem_family import ProblemFamily as ProblemFamily
+    from neurosym.planning.validation import Validation as Validation
+    from neurosym.planning.validation import validate as validate
     from neurosym.registry import domain_names as domain_names
     from neurosym.registry import load_domain as load_domain
     from neurosym.registry import load_planner as load_planner
     from neurosym.registry import load_prior as load_prior
     from neurosym.registry import planner_names as planner_names
     from neurosym.registry import prior_names as prior_names
-    from neurosym.validation import Validation as Validation
-    from neurosym.validation import validate as validate
 
 
 def __getattr__(name: str) -> Any:
@@ -140,7 +140,7 @@ def __getattr__(name: str) -> Any:
     if name in _HOME_OF:
         return getattr(importlib.import_module(_HOME_OF[name]), name)
     if name in _MODULES:
-        return importlib.import_module(f"neurosym.{name}")
+        return importlib.import_module(_MODULES[name])
     raise AttributeError(f"module 'neurosym' has no attribute {name!r}")
 
 

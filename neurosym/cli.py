@@ -1,6 +1,6 @@
 """The command line. A command is one line here, and a function in `neurosym.commands`.
 
-Exit codes are in `neurosym.exit_codes`. Nothing heavy is imported before a command needs it.
+Exit codes are in `neurosym.commands.exit_codes`. Nothing heavy is imported before a command needs it.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import typer
 from neurosym import __version__
 from neurosym.commands.compare import compare
 from neurosym.commands.count import count
+from neurosym.commands.exit_codes import BAD_INPUT, EXIT_CODES, INTERRUPTED
 from neurosym.commands.export import export
 from neurosym.commands.inspect import inspect
 from neurosym.commands.learn import demos, train
@@ -26,7 +27,6 @@ from neurosym.commands.spread import spread
 from neurosym.commands.survey import doctor, names
 from neurosym.commands.view import view
 from neurosym.errors import NeurosymError
-from neurosym.exit_codes import BAD_INPUT, EXIT_CODES, INTERRUPTED
 
 _TABLE = "Exit codes:\n\n" + "\n\n".join(f"{code}: {meaning}" for code, meaning in sorted(EXIT_CODES.items()))
 

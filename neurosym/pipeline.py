@@ -13,11 +13,11 @@ import numpy as np
 
 from neurosym.errors import ContractError, InputError
 from neurosym.language.domain import Problem
-from neurosym.planner import Budget, OrderCount, Planner, PlanResult, Status
-from neurosym.prior import OrderScores, Prior
-from neurosym.problem import SearchProblem
+from neurosym.language.search_problem import SearchProblem
+from neurosym.planning.planner import Budget, OrderCount, Planner, PlanResult, Status
+from neurosym.planning.prior import OrderScores, Prior
+from neurosym.planning.validation import replay, validate
 from neurosym.registry import load_planner, load_prior
-from neurosym.validation import replay, validate
 
 ORACLES = ("geometry", "physics")
 

@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from neurosym.errors import ContractError, InputError, UnknownNameError
-from neurosym.family import ProblemFamily
-from neurosym.planner import Planner
-from neurosym.prior import Prior
+from neurosym.planning.planner import Planner
+from neurosym.planning.prior import Prior
+from neurosym.planning.problem_family import ProblemFamily
 
 T = TypeVar("T")
 
@@ -66,7 +66,7 @@ def load_prior(prior: str | Path | Prior, **options: Any) -> Prior:
     if isinstance(prior, Prior):
         return prior
     if str(prior).endswith(".safetensors"):
-        from neurosym.weights_header import read_header
+        from neurosym.planning.weights_header import read_header
 
         header = read_header(Path(prior))
         return _make(PRIORS, "prior", header.get("prior"), Prior, {"weights": Path(prior), **options})

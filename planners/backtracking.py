@@ -13,9 +13,9 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from neurosym.planner import Budget, Planner, PlannerTraits, PlanResult, SearchLog, Status
-from neurosym.prior import OrderScores
-from neurosym.problem import Rejection, SearchProblem, Step
+from neurosym.language.search_problem import Rejection, SearchProblem, Step
+from neurosym.planning.planner import Budget, Planner, PlannerTraits, PlanResult, SearchLog, Status
+from neurosym.planning.prior import OrderScores
 from planners.completion import RESOLUTION, Completion, remainder, with_first
 from planners.evidence import Lessons, Names, agenda, fitted, promise, representatives
 

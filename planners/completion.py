@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from neurosym.prior import LOG_FLOOR, OrderScores
+from neurosym.planning.prior import LOG_FLOOR, OrderScores
 
 #: Costs closer than this (nats) are equal, and something else decides. Far above the rounding of a sum of
 #: 1,000 costs of 30 nats (1e-11), far below any difference of probability that a network can mean.

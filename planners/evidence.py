@@ -8,8 +8,8 @@ from collections.abc import Hashable, Iterable, Sequence
 from typing import TypeVar
 
 from neurosym.errors import InputError
-from neurosym.prior import OrderScores
-from neurosym.problem import Rejection, SearchProblem
+from neurosym.language.search_problem import Rejection, SearchProblem
+from neurosym.planning.prior import OrderScores
 
 S = TypeVar("S", bound=Hashable)
 

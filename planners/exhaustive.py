@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from neurosym.errors import InputError
-from neurosym.planner import Budget, OrderCount, Planner, PlannerTraits, PlanResult, SearchLog, Status
-from neurosym.prior import OrderScores
-from neurosym.problem import Rejection, SearchProblem, Step
+from neurosym.language.search_problem import Rejection, SearchProblem, Step
+from neurosym.planning.planner import Budget, OrderCount, Planner, PlannerTraits, PlanResult, SearchLog, Status
+from neurosym.planning.prior import OrderScores
 from planners.evidence import fitted, representatives
 
 S = TypeVar("S", bound=Hashable)

@@ -11,9 +11,9 @@ from typing import Any, TypeVar
 import numpy as np
 
 from neurosym.errors import InputError
-from neurosym.planner import Budget, Planner, PlannerTraits, PlanResult, SearchLog, Status
-from neurosym.prior import OrderScores
-from neurosym.problem import Rejection, SearchProblem
+from neurosym.language.search_problem import Rejection, SearchProblem
+from neurosym.planning.planner import Budget, Planner, PlannerTraits, PlanResult, SearchLog, Status
+from neurosym.planning.prior import OrderScores
 from planners.evidence import fitted
 
 S = TypeVar("S", bound=Hashable)

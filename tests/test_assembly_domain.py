@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 
 import neurosym as ns
 from neurosym.geometry.shapes import Body, Mesh, Part
+from neurosym.geometry.step_motion import Way
 from neurosym.testing.domains import check_problem
-from neurosym.ways import Way
 
 family = ns.load_domain("assembly")
 Assembly = ns.Assembly

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 import neurosym as ns
-from neurosym import benchmark
-from neurosym.baseline import best_fixed_order, order_fails
-from neurosym.benchmark import Comparison, Outcome, Run, ask_priors, image_blind, run
-from neurosym.journal import Journal, key_of
-from neurosym.reporting import markdown, rows, table, write_csv
+from neurosym.experiments import benchmark
+from neurosym.experiments.benchmark import Comparison, Outcome, Run, ask_priors, image_blind, run
+from neurosym.experiments.fixed_order import best_fixed_order, order_fails
+from neurosym.experiments.journal import Journal, key_of
+from neurosym.experiments.reporting import markdown, rows, table, write_csv
 
 PLANNERS = ("swap-repair", "backtracking")
 SMALL = Comparison("soma", (3, 17, 42), PLANNERS, ("none", "random"), {"collapse": "cubes"}, seeds=2)

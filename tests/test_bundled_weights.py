@@ -9,8 +9,8 @@ import neurosym as ns
 from learned_priors.metrics import re_used
 from learned_priors.network_prior import NetworkPrior
 from neurosym.errors import InputError
+from neurosym.planning.weights_header import read_header
 from neurosym.testing import check_prior
-from neurosym.weights_header import read_header
 
 soma = ns.load_domain("soma")
 LEARNED = ("sinkhorn", "tcn", "sinkhorn-paper", "tcn-paper")

@@ -13,9 +13,9 @@ import learned_priors
 import neurosym as ns
 from neurosym import __version__
 from neurosym.cli import main
-from neurosym.exit_codes import BAD_INPUT, EXIT_CODES, INTERRUPTED
-from neurosym.options import check_options, options_of
-from neurosym.weights_header import read_header
+from neurosym.commands.exit_codes import BAD_INPUT, EXIT_CODES, INTERRUPTED
+from neurosym.language.options import check_options, options_of
+from neurosym.planning.weights_header import read_header
 
 #: The L before all others: under the rule `cubes` no order of cube 17 can.
 IMPOSSIBLE = [part for other in "VTZABP" for part in ("--before", f"L,{other}")]
@@ -107,7 +107,7 @@ def test_an_interrupt_has_its_own_code(monkeypatch):
 
 
 def test_a_doctor_that_finds_something_says_so(monkeypatch, capsys):
-    monkeypatch.setattr("neurosym.doctor.fcl_works", lambda: 1 / 0)
+    monkeypatch.setattr("neurosym.commands.doctor.fcl_works", lambda: 1 / 0)
     assert call("doctor") == 1
     assert "pip install --force-reinstall python-fcl" in capsys.readouterr().out
 
@@ -253,7 +253,7 @@ def test_list_names_everything_registered(capsys):
 
 
 def test_weights_of_one_domain_that_several_packages_have_are_all_listed(monkeypatch, capsys):
-    monkeypatch.setattr("neurosym.catalogue.weights_beside", lambda entry: {"soma": [entry.name]})
+    monkeypatch.setattr("neurosym.planning.catalogue.weights_beside", lambda entry: {"soma": [entry.name]})
     assert call("list", "--json") == 0
     assert json.loads(capsys.readouterr().out)["weights"] == {"soma": ns.prior_names()}
 

@@ -16,8 +16,8 @@ import neurosym as ns
 from neurosym.cli import main
 from neurosym.commands.assemblies import FileOptions, problem_at
 from neurosym.commands.spread import spread
-from neurosym.plan_files import read_plan
-from neurosym.ways import Way
+from neurosym.geometry.step_motion import Way
+from neurosym.planning.plan_files import read_plan
 
 SHARED = Path(__file__).parents[1] / ".." / "shared" / "data"
 

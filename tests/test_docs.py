@@ -21,7 +21,7 @@ import typer.main
 from learned_priors import encoders
 from neurosym import registry
 from neurosym.cli import app, main
-from neurosym.exit_codes import EXIT_CODES
+from neurosym.commands.exit_codes import EXIT_CODES
 from neurosym.geometry.tolerances import DEFAULT_TOLERANCES
 
 ROOT = Path(__file__).parents[1]
@@ -203,7 +203,7 @@ def public_names(module):
     "package",
     [
         "neurosym",
-        "neurosym.predicates",
+        "neurosym.language.predicates",
         "neurosym.plotting",
         "neurosym.simulation",
         "neurosym.testing",

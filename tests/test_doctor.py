@@ -4,8 +4,8 @@ import json
 
 import pytest
 
-from neurosym import doctor
 from neurosym.cli import main
+from neurosym.commands import doctor
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +59,7 @@ def test_a_check_that_raises_is_a_finding():
 
 
 def test_a_wrong_answer_of_fcl_is_noticed(monkeypatch):
-    monkeypatch.setattr("neurosym.geometry.collision.collide", lambda a, b: True)
+    monkeypatch.setattr("neurosym.geometry.contact.collision.collide", lambda a, b: True)
     assert not doctor.works("FCL", doctor.fcl_works).ok
 
 

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 import neurosym as ns
-from neurosym import engines
-from neurosym.engines import connection, run_tasks
-from neurosym.imitation import reproduce_study
-from neurosym.studies import study
+from neurosym.experiments import engines
+from neurosym.experiments.engines import connection, run_tasks
+from neurosym.experiments.imitation import reproduce_study
+from neurosym.experiments.studies import study
 
 
 def drawn(seed: int) -> float:

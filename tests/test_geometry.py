@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 import neurosym as ns
-from neurosym.geometry.blocking import bits
-from neurosym.geometry.contacts import TABLE
-from neurosym.geometry.sweep import exits_along, triangles_block
+from neurosym.geometry.blocking.sweep import exits_along, triangles_block
+from neurosym.geometry.contact.contacts import TABLE
+from neurosym.support.bitsets import bits
 
 AXES = np.concatenate([np.eye(3), -np.eye(3)])
 

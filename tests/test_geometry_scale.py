@@ -15,9 +15,9 @@ from scipy.spatial.transform import Rotation
 
 import neurosym as ns
 from neurosym.geometry.assembly import NO_TABLE
-from neurosym.geometry.blocking import bits
-from neurosym.geometry.contacts import TABLE
-from neurosym.geometry.directions import directions_for
+from neurosym.geometry.blocking.directions import directions_for
+from neurosym.geometry.contact.contacts import TABLE
+from neurosym.support.bitsets import bits
 
 DATA = Path(__file__).parents[2] / "shared" / "data"
 AXES = np.concatenate([np.eye(3), -np.eye(3)])
@@ -67,7 +67,7 @@ stacks = st.composite(stack)()
 @pytest.mark.parametrize("local", [False, True])
 def test_answers_are_those_of_the_linear_program(local, cells, data):
     """Also when each is asked after another one, and answered from what is near the change."""
-    from neurosym.geometry import stability as module
+    from neurosym.geometry.stability import standing as module
 
     with pytest.MonkeyPatch.context() as patch:
         if local:
@@ -354,7 +354,7 @@ def test_a_dome_of_527_stands_on_its_fixed_ring():
 
 def test_newtons_method_converges_on_all_of_a_dome_at_once():
     """Asked without any forces to begin with; where steps were only halved it ended before."""
-    from neurosym.geometry.equilibrium import QUICK, THOROUGH
+    from neurosym.geometry.stability.equilibrium import QUICK, THOROUGH
 
     assembly = structure("dome")
     equilibrium, stone = assembly.stability().equilibrium, assembly.index["408"]

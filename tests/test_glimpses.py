@@ -12,9 +12,9 @@ import torch
 from learned_priors.encoders import build_encoder
 from learned_priors.network_prior import NetworkPrior
 from learned_priors.networks import NetworkConfig, OrderNetwork
-from neurosym.demonstrations import Demonstrations
+from neurosym.planning.demonstrations import Demonstrations
+from neurosym.planning.weights_header import read_header
 from neurosym.registry import load_prior
-from neurosym.weights_header import read_header
 
 #: Five colours that a picture shows from the bottom up, each somewhere else every time.
 COLOURS = np.array([[230, 60, 60], [60, 200, 60], [70, 70, 230], [230, 220, 60], [60, 220, 220]])

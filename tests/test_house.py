@@ -34,7 +34,7 @@ def test_the_probe_sees_what_is_loaded():
         "import neurosym as ns; ns.Budget, ns.Status, ns.load_domain, ns.planner_names(), ns.prior_names()",
         "import domains, planners, learned_priors, neurosym.simulation",
         "import neurosym.cli",
-        "import neurosym.plotting, neurosym.benchmark, neurosym.reporting, neurosym.doctor",
+        "import neurosym.plotting, neurosym.experiments.benchmark, neurosym.commands.doctor",
         "import neurosym.cli\ntry: neurosym.cli.main(['--help'])\nexcept SystemExit: pass",
         "import neurosym.cli\ntry: neurosym.cli.main(['compare', '--help'])\nexcept SystemExit: pass",
     ],

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import neurosym as ns
-from neurosym import imitation
-from neurosym.imitation import reproduce_study, study, study_names
-from neurosym.measures import compare_orders
+from neurosym.experiments import imitation
+from neurosym.experiments.imitation import reproduce_study, study, study_names
+from neurosym.experiments.order_accuracy import compare_orders
 
 TINY = replace(
     study("variable"), methods=("tcn-paper+hungarian", "bc"), baselines=("blind",), sizes=(12,), seeds=1

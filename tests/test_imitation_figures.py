@@ -12,16 +12,16 @@ from PIL import Image
 
 import neurosym as ns
 from neurosym.cli import main
-from neurosym.exit_codes import BAD_INPUT
-from neurosym.findings import findings
-from neurosym.imitation import study, study_names
-from neurosym.imitation_report import report, write_results
-from neurosym.measures import Counts
+from neurosym.commands.exit_codes import BAD_INPUT
+from neurosym.experiments.conclusions import findings
+from neurosym.experiments.csv_lines import Record
+from neurosym.experiments.imitation import study, study_names
+from neurosym.experiments.imitation_report import report, write_results
+from neurosym.experiments.order_accuracy import Counts
+from neurosym.experiments.results_page import LARGEST, finished_runs, write_results_page
+from neurosym.experiments.study_figures import figures
+from neurosym.experiments.study_results import Results
 from neurosym.plotting import COLUMN, kernel_density
-from neurosym.records import Record
-from neurosym.results_page import LARGEST, finished_runs, write_results_page
-from neurosym.study_figures import figures
-from neurosym.study_results import Results
 
 LETTERS = "abcdefghijklmnopqrstuvwxyz"
 COLOURS = ("red", "blue", "green", "cyan", "pink", "grey")

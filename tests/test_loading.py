@@ -18,13 +18,14 @@ from scipy.spatial.transform import Rotation
 from step_files import step_boxes
 
 import neurosym as ns
-from neurosym.geometry import collision, topology, triangles
-from neurosym.geometry.formats.burrtools import rotations
-from neurosym.geometry.formats.contents import RawMesh
-from neurosym.geometry.formats.names import distinct
-from neurosym.geometry.formats.polygons import triangulate
-from neurosym.geometry.health import examine
-from neurosym.geometry.mating import overlaps
+from neurosym.geometry.contact import collision
+from neurosym.geometry.contact.overlaps import overlaps
+from neurosym.geometry.mesh import topology, triangles
+from neurosym.geometry.mesh.polygons import triangulate
+from neurosym.geometry.readers.burrtools import rotations
+from neurosym.geometry.readers.contents import RawMesh
+from neurosym.geometry.readers.health import examine
+from neurosym.geometry.readers.names import distinct
 from neurosym.geometry.shapes import Body, Box, Convex, Part
 from neurosym.geometry.shapes import Mesh as MeshShape
 from neurosym.geometry.tolerances import Tolerances

@@ -14,14 +14,14 @@ from scipy.spatial.transform import Rotation
 
 import neurosym as ns
 from neurosym.errors import InputError, UnknownNameError
-from neurosym.geometry.clearance import Clearance
-from neurosym.geometry.extraction import Failure, extract
-from neurosym.geometry.grid import cells_of
-from neurosym.geometry.inset import inset_vertices
-from neurosym.geometry.motions import Motion, shifted
-from neurosym.geometry.paths import Path, Track
+from neurosym.geometry.mesh.inset import inset_vertices
+from neurosym.geometry.paths.clearance import Clearance
+from neurosym.geometry.paths.extraction import Failure, extract
+from neurosym.geometry.paths.grid import cells_of
+from neurosym.geometry.paths.path import Path, Track
+from neurosym.geometry.paths.voxel_moves import Separation, first_separation
+from neurosym.geometry.rigid_motions import Motion, shifted
 from neurosym.geometry.shapes import Body, Box, Mesh, Part
-from neurosym.geometry.voxel_moves import Separation, first_separation
 from neurosym.testing.burrs import RINGS
 
 STAY = np.eye(4)

@@ -16,11 +16,11 @@ import pytest
 import neurosym as ns
 from neurosym.cli import main
 from neurosym.errors import InputError, UnknownNameError
-from neurosym.geometry.falls import find_falls
-from neurosym.language import pddl_gravity
+from neurosym.geometry.stability.falls import find_falls
 from neurosym.language.domain import Problem
-from neurosym.language.pddl import PddlTask, as_pddl, write_pddl
-from neurosym.language.pddl_names import RESERVED, Names
+from neurosym.pddl import gravity as pddl_gravity
+from neurosym.pddl.export import PddlTask, as_pddl, write_pddl
+from neurosym.pddl.names import RESERVED, Names
 from neurosym.pipeline import count_orders
 
 pyperplan = pytest.importorskip("pyperplan.planner", reason="pyperplan is not installed: pip install '.[pddl]'")
@@ -274,7 +274,7 @@ def test_falls_are_true_and_none_is_missed() -> None:
 def test_what_cannot_be_written_is_refused_and_leaves_no_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(InputError, match="groups"):
         write_pddl(ASSEMBLY.problem(0, groups=True, gravity=False), tmp_path / "none")
-    monkeypatch.setattr("neurosym.language.pddl_table.MAX_STATES", 3)
+    monkeypatch.setattr("neurosym.pddl.table.MAX_STATES", 3)
     with pytest.raises(InputError, match="not_in_the_middle"):
         write_pddl(PROBLEMS["own, silent"], tmp_path / "none")
     assert not (tmp_path / "none").exists()

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from neurosym.planner import Status
-from neurosym.prior import OrderScores
+from neurosym.planning.planner import Status
+from neurosym.planning.prior import OrderScores
 from neurosym.testing.toys import Counting, NumberLine, Removal, Table, Tiles
 from planners import Backtracking, BestFirst, Exhaustive, SwapRepair, count_plans, order_marginals
 from planners.completion import Completion, remainder, with_first

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linear_sum_assignment
 
-from neurosym.planner import Status
-from neurosym.prior import OrderScores
+from neurosym.planning.planner import Status
+from neurosym.planning.prior import OrderScores
 from neurosym.testing.toys import Counting, NumberLine, Removal, Tiles, brute_force_plans
 from planners import Backtracking, BestFirst, Exhaustive, all_plans, count_plans, order_marginals
 from planners.completion import Completion

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from neurosym.errors import ContractError
-from neurosym.planner import Budget, Planner, PlannerTraits, SearchLog, Status
-from neurosym.problem import Rejection
+from neurosym.language.search_problem import Rejection
+from neurosym.planning.planner import Budget, Planner, PlannerTraits, SearchLog, Status
 from neurosym.testing import check_planner
 from planners import Backtracking, BestFirst, Exhaustive, SwapRepair
 

@@ -7,9 +7,9 @@ import pytest
 
 import neurosym.testing
 from neurosym.errors import InputError, UnknownNameError
-from neurosym.planner import Budget, Status
-from neurosym.prior import OrderScores
-from neurosym.problem import Rejection, Step
+from neurosym.language.search_problem import Rejection, Step
+from neurosym.planning.planner import Budget, Status
+from neurosym.planning.prior import OrderScores
 from neurosym.registry import load_planner, planner_names
 from neurosym.testing.planners import check_planner, toys
 from neurosym.testing.toys import NumberLine, Removal

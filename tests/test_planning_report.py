@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from neurosym.planning_report import findings, methods_figure, report
-from neurosym.records import Record
-from neurosym.reproduce import Experiment
+from neurosym.experiments.csv_lines import Record
+from neurosym.experiments.planning_report import findings, methods_figure, report
+from neurosym.experiments.reproduce import Experiment
 
 SOMA = Experiment("soma", splits=2, styles=("clean",), methods=("sinkhorn", "sinkhorn-paper", "tcn-paper"))
 FAILURES = {"sinkhorn": 0.05, "sinkhorn-paper": 0.3, "tcn-paper": 0.4, "random": 0.9, "blind": 0.7}

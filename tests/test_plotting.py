@@ -10,10 +10,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import neurosym as ns
-from neurosym.benchmark import Comparison, Outcome, Run
+from neurosym.experiments.benchmark import Comparison, Outcome, Run
+from neurosym.experiments.order_accuracy import Counts
 from neurosym.geometry.shapes import Body, Box, Part
-from neurosym.measures import Counts
-from neurosym.motions import Staging, building, stage
+from neurosym.planning.staging import Staging, building, stage
 from neurosym.plotting import (
     COLOURS,
     COLUMN,

@@ -12,7 +12,7 @@ from PIL import Image
 import neurosym as ns
 from neurosym.cli import main
 from neurosym.errors import InputError, MissingDependencyError
-from neurosym.motions import Motion, Staging, stage
+from neurosym.planning.staging import Motion, Staging, stage
 from neurosym.simulation import film_files, open_clients
 from neurosym.simulation.animation import LONGEST, SHORTEST_STEP, frames, pace
 from neurosym.simulation.captions import captioned

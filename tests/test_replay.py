@@ -24,8 +24,9 @@ import neurosym as ns
 from neurosym.cli import main
 from neurosym.errors import InputError, NeurosymError, UnknownNameError
 from neurosym.geometry.assembly import Body, Box, Mesh, Part
-from neurosym.motions import Motion, Staging, building, pose_along, stage, steps_in_space
-from neurosym.plan_files import read_plan
+from neurosym.geometry.step_motion import Way
+from neurosym.planning.plan_files import read_plan
+from neurosym.planning.staging import Motion, Staging, building, pose_along, stage, steps_in_space
 from neurosym.simulation import Physics, World, open_clients, replay_plan, replay_staging
 from neurosym.simulation.cutting import cut_into_convex
 from neurosym.simulation.decomposition import convex_pieces
@@ -34,7 +35,6 @@ from neurosym.simulation.solids import rigid_bodies
 from neurosym.simulation.window import Window
 from neurosym.simulation.world_window import WorldWindow
 from neurosym.testing.burrs import burr
-from neurosym.ways import Way
 
 BEAM = {"post": [(0, 0, 0)], "beam": [(0, 0, 1), (1, 0, 1)], "weight": [(0, 0, 2)]}
 BOX_WITH_LID = {

@@ -7,8 +7,8 @@ import csv
 import pytest
 
 import neurosym as ns
-from neurosym import reproduce as experiments
-from neurosym.reproduce import Experiment, reproduce
+from neurosym.experiments import reproduce as experiments
+from neurosym.experiments.reproduce import Experiment, reproduce
 
 TINY = Experiment(
     "soma", splits=1, styles=("clean",), methods=("sinkhorn-paper", "tcn-paper"), repeats=1, epochs=1, tests=12

@@ -13,15 +13,15 @@ from collections import Counter
 
 import pytest
 
-from neurosym.journal import Journal
+from neurosym.experiments.journal import Journal
 
 #: Small enough for seconds, slow enough (it waits after each trial) to be killed in between.
 STUDY = """
 import sys, time
 from dataclasses import replace
 from pathlib import Path
-from neurosym.imitation import reproduce_study
-from neurosym.studies import study
+from neurosym.experiments.imitation import reproduce_study
+from neurosym.experiments.studies import study
 
 given = replace(study("variable"), methods=("bc", "sinkhorn"), sizes=(12, 16), seeds=2)
 given = replace(given, test=lambda n: {"variant": "heights", "count": 20}, figures=())
@@ -31,7 +31,7 @@ reproduce_study(given, Path(sys.argv[1]), epochs=2, workers=int(sys.argv[2]), sa
 SOMA = """
 import sys
 from pathlib import Path
-from neurosym.reproduce import Experiment, reproduce
+from neurosym.experiments.reproduce import Experiment, reproduce
 
 what = {"splits": 1, "styles": ("clean",), "methods": ("sinkhorn-paper", "tcn-paper"), "planners": ("swap-repair",)}
 given = Experiment("soma", **what, repeats=1, epochs=20, tests=8)

@@ -10,11 +10,11 @@ import neurosym as ns
 from learned_priors import NetworkPrior
 from learned_priors.recipes import RECIPES
 from neurosym.commands.common import taken_by
-from neurosym.imitation import reproduce_study
-from neurosym.journal import Journal
-from neurosym.reproduce import soma_experiment
-from neurosym.studies import study, study_names
-from neurosym.study_scales import SCALES
+from neurosym.experiments.imitation import reproduce_study
+from neurosym.experiments.journal import Journal
+from neurosym.experiments.reproduce import soma_experiment
+from neurosym.experiments.studies import study, study_names
+from neurosym.experiments.study_scales import SCALES
 
 
 @pytest.mark.parametrize("scale", SCALES)

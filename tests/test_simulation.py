@@ -12,7 +12,7 @@ import pytest
 
 from neurosym.errors import InputError, UnknownNameError
 from neurosym.geometry.assembly import Assembly, Body, Convex, Mesh, Part
-from neurosym.problem import Rejection, Step
+from neurosym.language.search_problem import Rejection, Step
 from neurosym.simulation import PhysicsOracle, World, open_clients, stands
 from neurosym.simulation.solids import rigid_bodies
 

@@ -22,8 +22,8 @@ from learned_priors.networks import Logits
 from learned_priors.recipes import RECIPES
 from learned_priors.sinkhorn import log_sinkhorn
 from learned_priors.training import FitProgress
-from neurosym.demonstrations import Demonstrations
 from neurosym.errors import CheckpointError, InputError, UnknownNameError
+from neurosym.planning.demonstrations import Demonstrations
 
 COLOURS = np.array([[220, 40, 40], [40, 200, 60], [50, 80, 220], [230, 210, 50]], dtype=np.uint8)
 TINY = replace(RECIPES["sinkhorn"].train, epochs=6, least_steps=0, batch=16)
@@ -106,7 +106,7 @@ def test_a_run_killed_in_the_middle_of_an_epoch_goes_on(tmp_path: Path) -> None:
     finally:
         os.kill(child.pid, signal.SIGKILL)
         child.wait()
-    from neurosym.weights_header import read_header
+    from neurosym.planning.weights_header import read_header
 
     state = read_header(at)["state"]
     assert 0 < state["updates"] < 160, "the kill came too early or too late to show anything"

@@ -22,9 +22,10 @@ from PIL import Image
 
 import neurosym as ns
 from neurosym.cli import main
-from neurosym.geometry.meshes import signed_volume
-from neurosym.motions import Motion, Staging, stage, steps_in_space
-from neurosym.options import options_of
+from neurosym.geometry.readers.meshes import signed_volume
+from neurosym.language.options import options_of
+from neurosym.planning.planner import Plan
+from neurosym.planning.staging import Motion, Staging, stage, steps_in_space
 from neurosym.testing import burrs
 from neurosym.viewer import panels, score_table
 from neurosym.viewer.attempts import BECAUSE, FEW, MOST_COUNTED, MOST_REFUSALS, attempts, most_refused
@@ -128,7 +129,7 @@ def test_a_part_leaves_along_the_path_of_its_step_while_the_others_rest(soma, fi
 
 def test_a_plan_that_puts_together_is_the_film_backwards(soma, film):
     problem, result = soma
-    back = ns.planner.Plan(result.plan, [ns_way(n, h) for n, h in zip(result.plan, result.how)]).reversed()
+    back = Plan(result.plan, [ns_way(n, h) for n, h in zip(result.plan, result.how)]).reversed()
     reverse = Timeline(stage(problem, back, back.how))
     assert reverse.backwards
     assert (reverse.where == film.where[::-1]).all()
@@ -140,7 +141,7 @@ def test_a_plan_that_puts_together_is_the_film_backwards(soma, film):
 
 
 def ns_way(name, how):
-    from neurosym.ways import Way
+    from neurosym.geometry.step_motion import Way
 
     return Way.along((name,), how)
 

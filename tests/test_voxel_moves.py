@@ -12,9 +12,9 @@ from scipy.spatial.transform import Rotation
 
 import neurosym as ns
 from neurosym.errors import InputError
-from neurosym.geometry import voxel_search
-from neurosym.geometry.grid import GridCells, cells_of
-from neurosym.geometry.voxel_moves import (
+from neurosym.geometry.paths import voxel_search
+from neurosym.geometry.paths.grid import GridCells, cells_of
+from neurosym.geometry.paths.voxel_moves import (
     DIRECTIONS,
     Separation,
     Stuck,

@@ -12,8 +12,8 @@ import typer
 from neurosym.errors import InputError
 
 if TYPE_CHECKING:
-    from neurosym.assembly_files import Reading
     from neurosym.geometry.assembly import Assembly
+    from neurosym.geometry.readers.reading import Reading
     from neurosym.language.domain import Problem
 
 
@@ -67,7 +67,7 @@ class FileOptions:
 
     def reading(self) -> Reading:
         """As the library takes them."""
-        from neurosym.assembly_files import Reading
+        from neurosym.geometry.readers.reading import Reading
 
         return Reading(**{**vars(self), "up": None if self.up is None else self.up.value})
 

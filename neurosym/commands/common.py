@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from neurosym.errors import InputError
-from neurosym.family import ProblemFamily, Progress
-from neurosym.files import write_text
+from neurosym.planning.problem_family import ProblemFamily, Progress
+from neurosym.support.files import write_text
 
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType

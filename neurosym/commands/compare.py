@@ -28,13 +28,13 @@ from neurosym.commands.common import (
     say,
     taken_by,
 )
-from neurosym.engines import cores
 from neurosym.errors import InputError, UnknownNameError
-from neurosym.family import ProblemFamily
+from neurosym.experiments.engines import cores
+from neurosym.planning.problem_family import ProblemFamily
 
 if TYPE_CHECKING:
-    from neurosym.benchmark import Comparison, Outcome
-    from neurosym.reporting import Row
+    from neurosym.experiments.benchmark import Comparison, Outcome
+    from neurosym.experiments.reporting import Row
 
 PLANNERS = ("swap-repair", "backtracking", "best-first")
 PRIORS = ("none", "tcn-paper", "sinkhorn-paper", "tcn", "sinkhorn")
@@ -71,9 +71,9 @@ def compare(
     `solved` counts the problems that were solved under every seed; means are over problems x seeds.
     Without --out, files go to out/compare-DOMAIN (with --json nowhere).
     """
-    from neurosym.benchmark import Comparison, Outcome, image_blind, run
+    from neurosym.experiments.benchmark import Comparison, Outcome, image_blind, run
+    from neurosym.experiments.reporting import rows
     from neurosym.registry import load_domain
-    from neurosym.reporting import rows
 
     if out is not None and out.exists() and not out.is_dir():
         raise InputError(f"Expected --out to be a folder; {out} is a file.")
@@ -131,7 +131,7 @@ def _once(names: Sequence[str]) -> tuple[str, ...]:
 
 def _scores(comparison: Comparison, *, asked: bool, workers: int) -> tuple[Comparison, dict[str, Any]]:
     """What the priors say; of the default ones, those that do not know this domain are left out."""
-    from neurosym.benchmark import ask_priors
+    from neurosym.experiments.benchmark import ask_priors
 
     def leave_out(name: str, error: InputError) -> None:
         say(f"Left out: the prior {name}. {error}")
@@ -142,9 +142,9 @@ def _scores(comparison: Comparison, *, asked: bool, workers: int) -> tuple[Compa
 
 
 def _write(outcome: Outcome, table: list[Row], folder: Path) -> None:
-    from neurosym.files import write_text
+    from neurosym.experiments.reporting import report, write_csv
     from neurosym.plotting import iterations_figure, save
-    from neurosym.reporting import report, write_csv
+    from neurosym.support.files import write_text
 
     write_csv(table, folder / "results.csv")
     write_text(folder / "results.md", report(outcome))
@@ -152,7 +152,7 @@ def _write(outcome: Outcome, table: list[Row], folder: Path) -> None:
 
 
 def _show(outcome: Outcome, given: list[Row], family: ProblemFamily, folder: Path | None) -> None:
-    from neurosym.reporting import table
+    from neurosym.experiments.reporting import table
 
     comparison = outcome.comparison
     shown = table(given)

@@ -45,12 +45,12 @@ def export(
     written: list[Path] = []
     said: dict[str, Any] = {}
     if graph is not None:
-        from neurosym.graphs import assembly_graph, write_graph
+        from neurosym.geometry.blocking.export import assembly_graph, write_graph
 
         write_graph(assembly_graph(problem.world, problem.details["directions"]), graph)
         written.append(graph)
     if pddl is not None:
-        from neurosym.language.pddl import as_pddl
+        from neurosym.pddl.export import as_pddl
 
         task = as_pddl(problem, seconds=seconds)
         written += task.write(pddl)

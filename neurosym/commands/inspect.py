@@ -9,8 +9,8 @@ from neurosym.commands.assemblies import AssemblyPath, FileOptions, Paths, Remov
 from neurosym.commands.common import AsJson, print_json
 
 if TYPE_CHECKING:
-    from neurosym.inspection import Inspection
     from neurosym.language.domain import Problem
+    from neurosym.planning.inspection import Inspection
 
 #: Lines of one kind that are shown; --json has all.
 SHOWN = 40
@@ -27,7 +27,7 @@ def inspect(
     Free and interlocked are meant for straight lines. With --paths any, and parts that are all made of cells, the
     least number of moves to the first separation (the level) is found, too.
     """
-    from neurosym.inspection import inspect_problem
+    from neurosym.planning.inspection import inspect_problem
 
     problem = problem_at(path, files, replace(removal, paths=None).given())
     found = inspect_problem(problem)
@@ -43,8 +43,8 @@ def inspect(
 
 def _level(problem: Problem) -> int | None:
     """Moves of groups, at the least, to the first separation; None: there is none, or it was not found."""
-    from neurosym.geometry.grid import cells_of
-    from neurosym.geometry.voxel_moves import Separation, first_separation
+    from neurosym.geometry.paths.grid import cells_of
+    from neurosym.geometry.paths.voxel_moves import Separation, first_separation
 
     world = problem.world
     cells = cells_of(world)

@@ -26,16 +26,16 @@ from neurosym.commands.common import (
     write_json,
 )
 from neurosym.errors import InputError
-from neurosym.family import ProblemFamily
-from neurosym.geometry.directions import in_words
-from neurosym.options import check_options
-from neurosym.plan_files import SCHEMA
-from neurosym.ways import Way
-from neurosym.words import joined
+from neurosym.geometry.blocking.directions import in_words
+from neurosym.geometry.step_motion import Way
+from neurosym.language.options import check_options
+from neurosym.planning.plan_files import SCHEMA
+from neurosym.planning.problem_family import ProblemFamily
+from neurosym.support.words import joined
 
 if TYPE_CHECKING:
     from neurosym.language.domain import Problem
-    from neurosym.planner import PlanResult
+    from neurosym.planning.planner import PlanResult
 
 #: The prior for assemblies, unless another is named.
 UNTRAINED = "outermost-first"
@@ -91,10 +91,10 @@ def plan(
 
     For an assembly the plan takes it apart; backwards, it puts it together.
     """
-    from neurosym.assembly_files import reference
-    from neurosym.benchmark import NO_PRIOR
+    from neurosym.experiments.benchmark import NO_PRIOR
+    from neurosym.geometry.readers.reading import reference
     from neurosym.pipeline import plans, solve
-    from neurosym.planner import Budget
+    from neurosym.planning.planner import Budget
     from neurosym.registry import load_domain
 
     path = _path(what, number, cells)

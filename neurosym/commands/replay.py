@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from neurosym.commands.common import AsJson, console, print_json, write_json
-from neurosym.exit_codes import UNWELL
-from neurosym.words import joined
+from neurosym.commands.exit_codes import UNWELL
+from neurosym.support.words import joined
 
 if TYPE_CHECKING:
     from neurosym.simulation.replay_report import ReplayReport, StepReplay
@@ -46,7 +46,7 @@ def replay(
     as_json: AsJson = False,
 ) -> None:
     """Do a plan in PyBullet, with gravity: did the rest stand still at each step, and by how much did it move?"""
-    from neurosym.plan_files import read_plan
+    from neurosym.planning.plan_files import read_plan
     from neurosym.simulation.replay import replay_plan
 
     saved = read_plan(path)

@@ -73,7 +73,7 @@ def reproduce(
     """
     # Before any network's library starts its threads: as many here as in workers, so that figures agree.
     os.environ.setdefault("OMP_NUM_THREADS", "1")
-    from neurosym.studies import study_names
+    from neurosym.experiments.studies import study_names
 
     folder = out or Path("out") / f"reproduce-{name}{'' if scale is Scale.quick else f'-{scale.value}'}"
     where = {"workers": workers, "engine": engine.value, "address": address}
@@ -98,7 +98,7 @@ def _study(
     where: dict[str, Any],
     folder: Path,
 ) -> str:
-    from neurosym.imitation import report, reproduce_study, study
+    from neurosym.experiments.imitation import report, reproduce_study, study
 
     given = study(name, scale.value)
     given = replace(given, seeds=seeds or given.seeds, methods=tuple(prior or given.methods))
@@ -117,8 +117,8 @@ def _planning(
     where: dict[str, Any],
     folder: Path,
 ) -> str:
-    from neurosym.reproduce import report, soma_experiment
-    from neurosym.reproduce import reproduce as rebuild
+    from neurosym.experiments.reproduce import report, soma_experiment
+    from neurosym.experiments.reproduce import reproduce as rebuild
 
     given = soma_experiment(scale.value)
     styles = tuple(p.value for p in pictures) if pictures else given.styles

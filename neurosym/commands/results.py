@@ -20,7 +20,7 @@ def results(
     ),
 ) -> None:
     """Put the reports of finished experiments on one page, with small copies of their figures."""
-    from neurosym.results_page import finished_runs, write_results_page
+    from neurosym.experiments.results_page import finished_runs, write_results_page
 
     found = folders or finished_runs(Path("out"))
     write_results_page(found, to)

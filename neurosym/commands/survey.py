@@ -8,14 +8,14 @@ from typing import Any
 import typer
 
 from neurosym.commands.common import AsJson, console, print_json
-from neurosym.exit_codes import UNWELL
+from neurosym.commands.exit_codes import UNWELL
 
 
 def names(as_json: AsJson = False) -> None:
     """List domains, planners with what they claim, priors, and the domains that there are trained weights for."""
     from importlib.metadata import entry_points
 
-    from neurosym.catalogue import summary, weights_beside
+    from neurosym.planning.catalogue import summary, weights_beside
     from neurosym.registry import DOMAINS, PRIORS, domain_names, load_domain, load_planner, planner_names
 
     domains = {name: load_domain(name).reference for name in domain_names()}
@@ -50,7 +50,7 @@ def _claims(traits: dict[str, Any]) -> str:
 
 def doctor(as_json: AsJson = False) -> None:
     """Say what is installed, who claims our package names, and whether FCL, PyBullet, OMPL and torch really work."""
-    from neurosym.doctor import examine
+    from neurosym.commands.doctor import examine
 
     out = console()
     found = []

@@ -1,1 +1,1 @@
-"""Geometry: assemblies, contacts, blocking and stability. The only place where FCL is spoken to."""
+"""What is where, and what is possible: assemblies as data, and the questions about them, a room each."""

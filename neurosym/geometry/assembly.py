@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from neurosym.errors import AssemblyError, UnknownNameError
-from neurosym.geometry.cells import parts_from_cells
 from neurosym.geometry.notes import Note
+from neurosym.geometry.readers.cells import parts_from_cells
 from neurosym.geometry.shapes import Array as Array
 from neurosym.geometry.shapes import Body as Body
 from neurosym.geometry.shapes import Box as Box
@@ -30,10 +30,10 @@ from neurosym.geometry.tolerances import DEFAULT_TOLERANCES, Tolerances
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from neurosym.geometry.blocking import BlockingGraph
-    from neurosym.geometry.contacts import Contact
-    from neurosym.geometry.directions import Directions
-    from neurosym.geometry.stability import Stability
+    from neurosym.geometry.blocking.directions import Directions
+    from neurosym.geometry.blocking.graph import BlockingGraph
+    from neurosym.geometry.contact.contacts import Contact
+    from neurosym.geometry.stability.standing import Stability
 
 T = TypeVar("T")
 
@@ -119,7 +119,7 @@ class Assembly:
             meshes: name -> a `trimesh.Trimesh`, or anything with ``vertices`` (n, 3) and ``faces`` (m, 3), or a
                 pair of such arrays. A part all of whose faces lie on one cubic grid (in any pose) becomes boxes.
         """
-        from neurosym.geometry.meshes import parts_from_meshes
+        from neurosym.geometry.readers.meshes import parts_from_meshes
 
         if not isinstance(meshes, Mapping):
             raise AssemblyError(f"Expected parts as {{name: mesh}}; got {type(meshes).__name__}.")
@@ -141,16 +141,16 @@ class Assembly:
         """An assembly from a folder of meshes or from a file, looked over.
 
         Args:
-            path: a folder with one mesh a part (OBJ, STL, PLY, OFF; see `neurosym.geometry.formats.folder`), or a file:
+            path: a folder with one mesh a part (OBJ, STL, PLY, OFF; see `neurosym.geometry.readers.folder`), or a file:
                 GLB, glTF, 3MF, STEP (extra ``cad``), BurrTools ``.xmpuzzle``, the JSON that `save` writes (see
-                `neurosym.geometry.formats.assembly_json`), or one mesh. Parts are named after files or nodes.
+                `neurosym.geometry.readers.assembly_json`), or one mesh. Parts are named after files or nodes.
             units: the unit of the assembly's lengths ("mm", "m", "in", ...). Of a format that states its own (glTF and
                 STEP metres, 3MF and JSON what they say) lengths are converted to it; of others it says what they are.
             fixed: names of parts that never move, besides those that the files name.
             tolerances: kept as they are where given. Otherwise touch is raised, to at most 5% of the smallest extent,
                 so that mating faces that overlap a little at rest count as touching; `notes` says by how much.
             friction: Coulomb's coefficient; None: the file's, else 0.5.
-            up: "y" or "z", what is up in the files; None: z, but in glTF see `neurosym.geometry.formats.gltf`.
+            up: "y" or "z", what is up in the files; None: z, but in glTF see `neurosym.geometry.readers.gltf`.
             problem, solution: which of a puzzle file's, counted from 1.
 
         Returns:
@@ -163,14 +163,14 @@ class Assembly:
             InputError: an unknown unit, part or number of a problem.
             MissingDependencyError: STEP without cascadio.
         """
-        from neurosym.geometry.loading import Options, load
+        from neurosym.geometry.readers.loading import Options, load
 
         options = Options(up=up, problem=problem, solution=solution)
         return load(path, units=units, fixed=fixed, tolerances=tolerances, friction=friction, options=options)
 
     def save(self, path: str | Path) -> None:
         """Write the assembly as JSON, whole or not at all; `load` gives the same one back, number by number."""
-        from neurosym.geometry.formats.assembly_json import write
+        from neurosym.geometry.readers.assembly_json import write
 
         write(self, path)
 
@@ -314,7 +314,7 @@ class Assembly:
 
         These are the axes of its boxes, up to sign, and the vertical; without boxes, the world's axes.
         """
-        from neurosym.geometry.directions import built_axes
+        from neurosym.geometry.blocking.directions import built_axes
 
         return built_axes(self)
 
@@ -335,27 +335,27 @@ class Assembly:
 
     def contacts(self) -> tuple[Contact, ...]:
         """Where bodies touch one another and the table: points, normals, areas."""
-        from neurosym.geometry.contacts import find_contacts
+        from neurosym.geometry.contact.contacts import find_contacts
 
         return self.remember("contacts", lambda: find_contacts(self))
 
     def contact_directions(self) -> Array:
         """float64 (k, 3): where the contacts let parts slide or lift off, those of most parts first."""
-        from neurosym.geometry.directions import contact_directions
+        from neurosym.geometry.blocking.directions import contact_directions
 
         return self.remember("contact directions", lambda: contact_directions(self))
 
     def blocking(self, directions: Directions = None) -> BlockingGraph:
         """What stands in the way of what, per direction (see `directions_for`); default `axes`."""
-        from neurosym.geometry.blocking import BlockingGraph
-        from neurosym.geometry.directions import directions_for
+        from neurosym.geometry.blocking.directions import directions_for
+        from neurosym.geometry.blocking.graph import BlockingGraph
 
         chosen = directions_for(self, directions)
         return self.remember(f"blocking {chosen.tobytes().hex()}", lambda: BlockingGraph(self, chosen))
 
     def stability(self) -> Stability:
         """Which subsets of the parts stand still under gravity."""
-        from neurosym.geometry.stability import Stability
+        from neurosym.geometry.stability.standing import Stability
 
         return self.remember("stability", lambda: Stability(self))
 

@@ -20,11 +20,11 @@ from neurosym.language.terms import Atom, Condition, Derived, Fluent, Literal, T
 
 if TYPE_CHECKING:
     from neurosym.language.grounding import GroundProblem
-    from neurosym.motions import Staging
-    from neurosym.planner import PlanResult
-    from neurosym.problem import SearchProblem
-    from neurosym.validation import Validation
-    from neurosym.why_not import WhyNot
+    from neurosym.language.search_problem import SearchProblem
+    from neurosym.planning.explanation import WhyNot
+    from neurosym.planning.planner import PlanResult
+    from neurosym.planning.staging import Staging
+    from neurosym.planning.validation import Validation
 
 #: More ground actions than this are refused: the definition wants a static fluent that narrows its parameters.
 MAX_GROUND_ACTIONS = 1_000_000
@@ -56,7 +56,7 @@ class Rules(Protocol):
         ...
 
     def replay(self, problem: Problem, order: Sequence[str], how: Sequence[Any]) -> Validation:
-        """See `neurosym.validation.validate`: shares no table with `search`, and asks the world afresh."""
+        """See `neurosym.planning.validation.validate`: shares no table with `search`, and asks the world afresh."""
         ...
 
 

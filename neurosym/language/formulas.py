@@ -1,7 +1,7 @@
 """What a derived predicate may say of itself besides its verdicts: when it holds, written over fluents.
 
 A verdict answers for one state; a formula speaks of all states at once, so that a problem can be written down for
-programs that cannot ask geometry (`neurosym.language.pddl`). `Derived.formula` gives one; it may be None.
+programs that cannot ask geometry (`neurosym.pddl.export`). `Derived.formula` gives one; it may be None.
 """
 
 from __future__ import annotations

@@ -7,10 +7,10 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from neurosym.errors import ContractError, DefinitionError, UnknownNameError
+from neurosym.geometry.step_motion import Way
 from neurosym.language.domain import check_precedence
+from neurosym.language.search_problem import Rejection, Step, Verdict
 from neurosym.language.terms import Atom, Derived, Fluent, Literal
-from neurosym.problem import Rejection, Step, Verdict
-from neurosym.ways import Way
 
 if TYPE_CHECKING:
     from neurosym.language.domain import Problem

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from neurosym.errors import DefinitionError
-from neurosym.problem import Verdict
+from neurosym.language.search_problem import Verdict
 
 if TYPE_CHECKING:
     from neurosym.language.formulas import Formula

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from neurosym.measures import NONE, Counts
+from neurosym.experiments.order_accuracy import NONE, Counts
 from neurosym.plotting.style import COLUMN, SMALL, TITLE, tidy
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from neurosym.measures import Counts
+from neurosym.experiments.order_accuracy import Counts
 from neurosym.plotting.style import COLUMN, SMALL, TITLE, look_of, tidy
 
 if TYPE_CHECKING:

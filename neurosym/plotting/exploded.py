@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from neurosym.geometry.assembly import Assembly
-    from neurosym.motions import Staging
+    from neurosym.planning.staging import Staging
 
 Array = NDArray[np.float64]
 
@@ -51,7 +51,8 @@ def exploded_figure(
     names. Save it as ``.svg`` or ``.pdf`` for print.
 
     Args:
-        what: an assembly, or a plan in space, as ``neurosym.motions.stage(problem, result.plan, result.how)`` gives it.
+        what: an assembly, or a plan in space, as
+            ``neurosym.planning.staging.stage(problem, result.plan, result.how)`` gives it.
         spread: how far apart: 1 so that a plan's parts are clear of one another, 0 not at all.
         view: azimuth and elevation of the viewer in degrees; 0, 0 looks from +x, and z is up.
         title: what it is.
@@ -59,7 +60,7 @@ def exploded_figure(
     Raises:
         InputError: a spread below 0, or a view that is not two numbers.
     """
-    from neurosym.motions import Staging
+    from neurosym.planning.staging import Staging
     from neurosym.simulation.exploded import explode  # geometry: no simulator is loaded
 
     if np.shape(view) != (2,) or not np.isfinite(view).all():

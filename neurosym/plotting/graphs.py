@@ -8,19 +8,19 @@ from typing import TYPE_CHECKING, Any
 import networkx as nx
 import numpy as np
 
+from neurosym.geometry.step_motion import GROUND
 from neurosym.plotting.layers import BOX, Layout, box_width, in_inches, in_layers, write_names
 from neurosym.plotting.matrices import blocking_matrices, contact_matrix, depths
 from neurosym.plotting.routes import Point, bends
 from neurosym.plotting.style import COLOURS, COLUMN, SMALL, TITLE
-from neurosym.ways import GROUND
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from neurosym.geometry.assembly import Assembly
-    from neurosym.geometry.blocking import BlockingGraph
-    from neurosym.geometry.directions import Directions
+    from neurosym.geometry.blocking.directions import Directions
+    from neurosym.geometry.blocking.graph import BlockingGraph
 
 #: More parts than this are drawn as a matrix.
 MOST_NODES = 16
@@ -85,7 +85,7 @@ def contact_figure(assembly: Assembly, *, title: str = "assembly") -> Figure:
     Without a ground the layers count from the fixed parts, or from the first one. Of more than `MOST_NODES` parts a
     matrix is drawn, coloured by area.
     """
-    from neurosym.geometry.contacts import TABLE  # loads FCL
+    from neurosym.geometry.contact.contacts import TABLE  # loads FCL
 
     areas: dict[tuple[str, str], float] = {}
     for contact in assembly.contacts():

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from neurosym.benchmark import NO_PRIOR, Outcome, Run
+from neurosym.experiments.benchmark import NO_PRIOR, Outcome, Run
+from neurosym.experiments.reporting import published
 from neurosym.plotting.layers import shortened
 from neurosym.plotting.style import COLOURS, COLUMN, LOOKS
-from neurosym.reporting import published
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

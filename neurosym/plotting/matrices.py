@@ -9,16 +9,16 @@ import networkx as nx
 import numpy as np
 from numpy.typing import NDArray
 
+from neurosym.geometry.step_motion import GROUND
 from neurosym.plotting.layers import shortened
 from neurosym.plotting.style import COLUMN, SMALL, TITLE, tidy
-from neurosym.ways import GROUND
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from neurosym.geometry.assembly import Assembly
-    from neurosym.geometry.blocking import BlockingGraph
+    from neurosym.geometry.blocking.graph import BlockingGraph
 
 #: More rows than this bear no names but numbers, and the size of the names (points).
 MOST_NAMES, _LETTERS = 31, 6
@@ -30,7 +30,7 @@ def blocking_matrices(title: str, graph: BlockingGraph, shown: Sequence[int]) ->
     """A matrix a direction: a row a part, dark where it hits the column's; the free ones come first."""
     from matplotlib.figure import Figure
 
-    from neurosym.geometry.blocking import bits
+    from neurosym.support.bitsets import bits
 
     columns = min(2, len(shown))
     rows = -(-len(shown) // columns)

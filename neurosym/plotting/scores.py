@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from neurosym.planning.prior import OrderScores
 from neurosym.plotting.layers import shortened, without_common
 from neurosym.plotting.style import COLOURS, COLUMN, SMALL, TITLE, tidy
-from neurosym.prior import OrderScores
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

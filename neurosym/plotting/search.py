@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from neurosym.planner import PlanResult
+from neurosym.planning.planner import PlanResult
 from neurosym.plotting.labels import width_of
 from neurosym.plotting.layers import shortened, without_common
 from neurosym.plotting.style import COLOURS, COLUMN, SMALL, TITLE

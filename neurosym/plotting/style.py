@@ -6,7 +6,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
-from neurosym.files import replacing
+from neurosym.support.files import replacing
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

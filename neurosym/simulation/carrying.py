@@ -8,7 +8,7 @@ from math import ceil
 import numpy as np
 from numpy.typing import NDArray
 
-from neurosym.motions import Motion
+from neurosym.planning.staging import Motion
 from neurosym.simulation.physics import BodyKey
 from neurosym.simulation.solids import matrix, quaternion
 from neurosym.simulation.world import World

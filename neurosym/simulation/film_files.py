@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from neurosym.errors import InputError, MissingDependencyError
-from neurosym.files import replacing
+from neurosym.support.files import replacing
 
 Picture = NDArray[np.uint8]
 

@@ -16,10 +16,10 @@ import numpy as np
 
 from neurosym.errors import InputError
 from neurosym.geometry.assembly import Assembly
-from neurosym.problem import Rejection, Step
+from neurosym.language.search_problem import Rejection, Step
 from neurosym.simulation.physics import MOVED_SHARE, SETTLE_STEPS, Physics, Snapshot
 from neurosym.simulation.world import World
-from neurosym.words import joined
+from neurosym.support.words import joined
 
 #: The state of a problem under physics: the symbols, and the actions done so far, in order.
 PhysicsState = tuple[int, tuple[int, ...]]

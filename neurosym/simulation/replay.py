@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from neurosym.motions import Motion, Staging, stage
+from neurosym.planning.staging import Motion, Staging, stage
 from neurosym.simulation.carrying import Carrier, hold
 from neurosym.simulation.oracle import COLLAPSE_CUBES, CUBES_CLEARANCE
 from neurosym.simulation.physics import MOVED_SHARE, SETTLE_STEPS, Physics, Snapshot

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from neurosym.motions import Motion
-from neurosym.words import joined
+from neurosym.planning.staging import Motion
+from neurosym.support.words import joined
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from neurosym.errors import InputError, UnknownNameError
 from neurosym.geometry.assembly import Assembly, Box, Shape
-from neurosym.motions import Staging
+from neurosym.planning.staging import Staging
 
 Array = NDArray[np.float64]
 RGB = tuple[float, float, float]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from neurosym.motions import Motion, Staging
+from neurosym.planning.staging import Motion, Staging
 from neurosym.simulation.filming import DEFAULT_CAMERA, TOPS_CAMERA
 from neurosym.simulation.looks import Camera
 
@@ -50,7 +50,7 @@ def first_part(motion: Motion) -> str:
 
 def describe(staging: Staging, step: int) -> str:
     """'remove L, along +z'; 'remove a with b, along +x'; 'take a off b, along -z'."""
-    from neurosym.geometry.directions import in_words
+    from neurosym.geometry.blocking.directions import in_words
 
     motion = staging.motions[step]
     around, part = set(company(staging, step)), first_part(motion)

@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 
 from neurosym.errors import ContractError
-from neurosym.family import ProblemFamily
 from neurosym.language.domain import Problem
-from neurosym.problem import Rejection, SearchProblem, Step
+from neurosym.language.search_problem import Rejection, SearchProblem, Step
+from neurosym.planning.problem_family import ProblemFamily
+from neurosym.planning.validation import replay, validate
 from neurosym.registry import load_domain
-from neurosym.validation import replay, validate
 
 
 def check_domain(

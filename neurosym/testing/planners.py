@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from neurosym.errors import ContractError
-from neurosym.planner import MAX_BLAME, Budget, Planner, PlanResult, Status
-from neurosym.prior import OrderScores
-from neurosym.problem import SearchProblem, Step
+from neurosym.language.search_problem import SearchProblem, Step
+from neurosym.planning.planner import MAX_BLAME, Budget, Planner, PlanResult, Status
+from neurosym.planning.prior import OrderScores
 from neurosym.registry import load_planner
 from neurosym.testing.toys import NumberLine, Removal, Table, Tiles, brute_force_plans
 from neurosym.testing.wrapped import Counting, Relabelled, Unproved
@@ -82,7 +82,7 @@ def priors(toy: Toy, seed: int) -> Iterator[tuple[str, OrderScores | None]]:
 
 
 def check_planner(planner: str | Planner, *, seeds: int = 12) -> None:
-    """Check that a planner keeps the contract of `neurosym.planner.Planner` and what its traits claim.
+    """Check that a planner keeps the contract of `neurosym.planning.planner.Planner` and what its traits claim.
 
     Args:
         planner: a registered name, or a planner.

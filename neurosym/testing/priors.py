@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from neurosym.errors import ContractError
-from neurosym.prior import OrderScores, Prior
+from neurosym.planning.prior import OrderScores, Prior
 
 if TYPE_CHECKING:
     from neurosym.language.domain import Problem

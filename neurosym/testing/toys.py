@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from neurosym.problem import Rejection, SearchProblem, Step
+from neurosym.language.search_problem import Rejection, SearchProblem, Step
 from neurosym.testing.wrapped import Counting as Counting
 from neurosym.testing.wrapped import Relabelled as Relabelled
 from neurosym.testing.wrapped import Unproved as Unproved

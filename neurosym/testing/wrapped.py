@@ -6,7 +6,7 @@ from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Generic, TypeVar
 
-from neurosym.problem import Rejection, SearchProblem, Step
+from neurosym.language.search_problem import Rejection, SearchProblem, Step
 
 S = TypeVar("S", bound=Hashable)
 

@@ -7,7 +7,7 @@ from html import escape
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from neurosym.planner import Refusal
+    from neurosym.planning.planner import Refusal
     from neurosym.viewer.shown import Search
 
 #: Refusals written out at a time; a hard search has thousands.

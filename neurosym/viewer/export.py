@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from neurosym.errors import InputError
-from neurosym.files import write_text
+from neurosym.support.files import write_text
 from neurosym.viewer import panels
 from neurosym.viewer.attempts import attempts, most_refused
 from neurosym.viewer.follow import follower

@@ -9,7 +9,7 @@ from typing import Any
 import viser
 
 from neurosym.errors import InputError
-from neurosym.options import options_of
+from neurosym.language.options import options_of
 from neurosym.pipeline import ORACLES
 from neurosym.registry import domain_names, planner_names, prior_names
 from neurosym.viewer import panels

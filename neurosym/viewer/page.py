@@ -12,7 +12,7 @@ import viser
 
 from neurosym.errors import InputError
 from neurosym.language.domain import Problem
-from neurosym.motions import stage
+from neurosym.planning.staging import stage
 from neurosym.viewer import panels
 from neurosym.viewer.attempts import BECAUSE, MOST_REFUSALS, attempts, looked_at, most_refused
 from neurosym.viewer.attempts import REFUSED as TRIED

@@ -12,9 +12,9 @@ from typing import Any
 
 from neurosym.errors import InputError, UnknownNameError
 from neurosym.language.domain import Problem
-from neurosym.options import check_options
+from neurosym.language.options import check_options
 from neurosym.pipeline import ORACLES, advice, solve
-from neurosym.planner import Budget, SearchLog
+from neurosym.planning.planner import Budget, SearchLog
 from neurosym.registry import load_domain, planner_names, prior_names
 from neurosym.viewer.shown import REFUSED, Maker, Query, Search, Shown
 

@@ -11,16 +11,16 @@ from numpy.typing import NDArray
 
 from neurosym.errors import InputError, NeurosymError
 from neurosym.language.domain import Problem
-from neurosym.motions import stage
+from neurosym.language.search_problem import Step
 from neurosym.pipeline import advice
-from neurosym.planner import PlanResult, Refusal, Status
-from neurosym.prior import OrderScores
-from neurosym.problem import Step
-from neurosym.validation import validate
+from neurosym.planning.planner import PlanResult, Refusal, Status
+from neurosym.planning.prior import OrderScores
+from neurosym.planning.staging import stage
+from neurosym.planning.validation import validate
 from neurosym.viewer.timeline import Timeline
 
 if TYPE_CHECKING:
-    from neurosym.plan_files import SavedPlan
+    from neurosym.planning.plan_files import SavedPlan
 
 #: Makes a problem of options given by name.
 Maker = Callable[..., Problem]

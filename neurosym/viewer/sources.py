@@ -8,10 +8,10 @@ from functools import partial, wraps
 from pathlib import Path
 from typing import Any
 
-from neurosym.assembly_files import Reading
 from neurosym.errors import InputError, UnknownNameError
+from neurosym.geometry.readers.reading import Reading
 from neurosym.language.domain import Problem
-from neurosym.plan_files import SavedPlan, problem_of, read_document, read_plan
+from neurosym.planning.plan_files import SavedPlan, problem_of, read_document, read_plan
 from neurosym.registry import domain_names, load_domain
 from neurosym.viewer.planning import problem_maker
 from neurosym.viewer.shown import Maker, Query

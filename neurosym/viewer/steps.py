@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from neurosym.geometry.directions import in_words
+from neurosym.geometry.blocking.directions import in_words
 from neurosym.viewer.panels import some
 
 if TYPE_CHECKING:
-    from neurosym.motions import Motion
+    from neurosym.planning.staging import Motion
     from neurosym.viewer.shown import Shown
 
 #: While a step of a longer list is under way, so many before it and after it are listed, to keep it in sight.

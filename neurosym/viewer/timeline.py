@@ -17,8 +17,8 @@ from scipy.spatial.transform import Rotation
 
 from neurosym.errors import InputError
 from neurosym.geometry.assembly import Assembly
-from neurosym.geometry.motions import shifted
-from neurosym.motions import Staging, pose_along
+from neurosym.geometry.rigid_motions import shifted
+from neurosym.planning.staging import Staging, pose_along
 
 Array = NDArray[np.float64]
 

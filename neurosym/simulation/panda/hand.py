@@ -11,7 +11,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from neurosym.geometry.joint_motion import plan_joint_motion
+from neurosym.geometry.paths.joint_motion import plan_joint_motion
 from neurosym.simulation.panda.arm import HOME, WIDEST
 from neurosym.simulation.panda.cell import TIME_STEP, Cell, Load
 

@@ -1,0 +1,153 @@
+"""What is installed, whether it is ours, and whether it works: `neurosym doctor` shows it, tests ask it."""
+
+from __future__ import annotations
+
+import importlib.util
+import platform
+import re
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path
+
+DISTRIBUTION = "neurosym-assembly"
+#: The packages that make up this library; on PyPI other projects hold two of these names.
+PACKAGES = ("neurosym", "domains", "planners", "learned_priors")
+#: Entry points here name a function without arguments, which returns one line or raises.
+CHECKS = "neurosym.checks"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One line of the report: `remedy` says what to do when `ok` is False."""
+
+    topic: str
+    name: str
+    ok: bool
+    said: str
+    remedy: str = ""
+
+
+def examine() -> Iterator[Finding]:
+    """All findings, one by one: versions, names, and whether each heavy dependency answers a question it must know."""
+    yield _python()
+    yield from _versions()
+    claimed = metadata.packages_distributions()
+    for package in PACKAGES:
+        yield claim(package, claimed)
+    for name, check in _checks().items():
+        yield works(name, check)
+
+
+def claim(package: str, claimed: Mapping[str, list[str]]) -> Finding:
+    """Whether a package is ours alone: no other distribution claims its name, and it is imported from our folder."""
+    others = sorted({d for d in claimed.get(package, []) if _canonical(d) != DISTRIBUTION})
+    if others:
+        remedy = f"Uninstall it (pip uninstall {' '.join(others)}), then install {DISTRIBUTION} again."
+        return Finding("names", package, False, f"also claimed by {', '.join(others)}", remedy)
+    spec = importlib.util.find_spec(package)
+    home = Path(__file__).resolve().parent.parent.parent
+    found = None if spec is None or spec.origin is None else Path(spec.origin).resolve().parent.parent
+    if found != home:
+        where = "not found" if found is None else f"imported from {found}, while neurosym is in {home}"
+        remedy = f"Remove or rename what hides it, or install {DISTRIBUTION} again."
+        return Finding("names", package, False, where, remedy)
+    return Finding("names", package, True, "ours alone")
+
+
+def works(name: str, check: Callable[[], str]) -> Finding:
+    """Call a check; whatever it raises is the finding."""
+    try:
+        return Finding("works", name, True, check())
+    except Exception as error:  # whatever a broken installation raises is what the user needs to read
+        remedy = f"Install it again: pip install --force-reinstall {_PACKAGE.get(name, name)}"
+        return Finding("works", name, False, f"{type(error).__name__}: {error}", remedy)
+
+
+def fcl_works() -> str:
+    """Two unit boxes whose answers are known: overlapping by a tenth, touching nothing, a unit apart."""
+    import numpy as np
+
+    from neurosym.geometry.contact.collision import box_object, box_patch, collide, distance
+
+    def at(x: float) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+        pose = np.eye(4)
+        pose[0, 3] = x
+        return pose
+
+    unit = np.ones(3)
+    still, near, far = box_object(unit, at(0.0)), box_object(unit, at(0.9)), box_object(unit, at(2.0))
+    if not collide(still, near) or collide(still, far):
+        raise RuntimeError("boxes that overlap, or that do not, are told apart wrongly")
+    patch = box_patch(still, near)
+    if patch is None or not np.allclose(patch[1], [1, 0, 0]):
+        raise RuntimeError(f"the normal between two boxes along x came as {None if patch is None else patch[1]}")
+    apart = distance(still, far)
+    if not np.isclose(apart, 1.0, atol=1e-6):
+        raise RuntimeError(f"two boxes one unit apart are {apart:g} apart")
+    return "boxes overlap, touch and keep their distance as they should"
+
+
+def pybullet_works() -> str:
+    """A ball that falls for a tenth of a second, against g t^2 / 2."""
+    from neurosym.simulation.client import Client
+
+    with Client() as client:
+        p = client.p
+        p.setGravity(0, 0, -9.81, physicsClientId=client.id)
+        ball = p.createCollisionShape(p.GEOM_SPHERE, radius=0.1, physicsClientId=client.id)
+        body = p.createMultiBody(1.0, ball, basePosition=[0, 0, 10], physicsClientId=client.id)
+        for _ in range(24):
+            p.stepSimulation(physicsClientId=client.id)
+        fallen = 10 - p.getBasePositionAndOrientation(body, physicsClientId=client.id)[0][2]
+    if not 0.04 < fallen < 0.06:
+        raise RuntimeError(f"a ball fell {fallen:g} m in 0.1 s; expected about 0.05")
+    return f"a ball falls {100 * fallen:.1f} cm in 0.1 s"
+
+
+def _ompl() -> str:
+    from neurosym.geometry.paths.extraction import ompl_works
+
+    return ompl_works()
+
+
+_PACKAGE = {"FCL": "python-fcl", "PyBullet": "pybullet", "OMPL": "ompl"}
+
+
+def _checks() -> dict[str, Callable[[], str]]:
+    """Ours, and those that other packages declare: torch is the business of the learned priors."""
+    found: dict[str, Callable[[], str]] = {"FCL": fcl_works, "PyBullet": pybullet_works, "OMPL": _ompl}
+    for entry in metadata.entry_points(group=CHECKS):
+        found[entry.name] = lambda entry=entry: str(entry.load()())  # type: ignore[misc]
+    return found
+
+
+def _python() -> Finding:
+    version = platform.python_version()
+    said = f"{version} on {platform.system()} {platform.machine()}"
+    return Finding("installed", "python", sys.version_info >= (3, 11), said, "Use Python 3.11 or later (best 3.11).")
+
+
+def _versions() -> Iterator[Finding]:
+    try:
+        own = metadata.version(DISTRIBUTION)
+        needed = metadata.requires(DISTRIBUTION) or []
+    except metadata.PackageNotFoundError:
+        remedy = "Install it: pip install -e . in the repository."
+        yield Finding("installed", DISTRIBUTION, False, "imported, but not installed", remedy)
+        return
+    yield Finding("installed", DISTRIBUTION, True, own)
+    for requirement in needed:
+        if "extra ==" in requirement:
+            continue
+        match = re.match(r"[A-Za-z0-9._-]+", requirement)
+        name = match.group() if match else requirement
+        try:
+            yield Finding("installed", name, True, metadata.version(name))
+        except metadata.PackageNotFoundError:
+            yield Finding("installed", name, False, "missing", f'pip install "{requirement}"')
+
+
+def _canonical(name: str) -> str:
+    return re.sub(r"[-_.]+", "-", name).lower()

@@ -1,0 +1,1 @@
+"""Everything that makes tables for the paper: comparisons, studies, their journals and reports."""

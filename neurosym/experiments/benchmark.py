@@ -1,0 +1,274 @@
+"""Compare planners and priors: (problem x planner x prior x seed) -> runs, on many processes, resumable.
+
+Generic over domains: a comparison names a family, numbers of its problems, planners and priors. Finished runs are
+kept in a journal, and a comparison that was interrupted, or is asked again with one more prior, does only the rest.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import zlib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from neurosym import __version__
+from neurosym.errors import InputError
+from neurosym.experiments.engines import cores, run_tasks
+from neurosym.experiments.fixed_order import best_fixed_order, order_fails
+from neurosym.experiments.journal import Journal, key_of
+from neurosym.language.options import check_options
+from neurosym.language.search_problem import SearchProblem
+from neurosym.pipeline import ORACLES, check_plan, open_oracle
+from neurosym.planning.planner import Budget
+from neurosym.planning.prior import OrderScores, Prior
+from neurosym.planning.problem_family import Progress
+from neurosym.registry import load_domain, load_planner, load_prior
+
+if TYPE_CHECKING:
+    from neurosym.language.domain import Problem
+
+#: The name of planning without a prior, in tables and on the command line.
+NO_PRIOR = "none"
+
+#: Raise it whenever the same comparison would give other runs, so that no journal answers for it.
+RUNS_VERSION = 3
+
+Cell = tuple[str, str, int]
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What is compared, on what.
+
+    Attributes:
+        domain: name of the problem family.
+        numbers: which of its problems.
+        planners: names of planners.
+        priors: names of priors or of weights files; `NO_PRIOR` plans without.
+        options: passed to ``family.problem(number, **options)``, for Soma collapse and pictures.
+        oracle: ``"geometry"`` or ``"physics"``.
+        seeds: how many times each problem is solved, with seeds 0 .. seeds - 1.
+        budget: of each run.
+    """
+
+    domain: str
+    numbers: tuple[int, ...]
+    planners: tuple[str, ...]
+    priors: tuple[str, ...]
+    options: Mapping[str, Any] = field(default_factory=dict)
+    oracle: str = "geometry"
+    seeds: int = 1
+    budget: Budget = field(default_factory=Budget)
+
+    def __post_init__(self) -> None:
+        if not (self.numbers and self.planners and self.priors):
+            raise InputError("Expected at least one problem, one planner and one prior to compare; got none of one.")
+        if self.seeds < 1:
+            raise InputError(f"Expected at least 1 seed; got {self.seeds}.")
+        if self.oracle not in ORACLES:
+            raise InputError(f"Expected an oracle, one of {', '.join(ORACLES)}; got {self.oracle!r}.")
+        check_options(load_domain(self.domain).problem, self.options, self.domain)
+        for planner in self.planners:
+            load_planner(planner)
+
+    @property
+    def cells(self) -> tuple[Cell, ...]:
+        """(planner, prior, seed), in the order of the table."""
+        return tuple((pl, pr, s) for pr in self.priors for pl in self.planners for s in range(self.seeds))
+
+
+@dataclass(frozen=True)
+class Run:
+    """One problem solved once. `first_order_failed`: whether the prior's own first order is refused somewhere."""
+
+    planner: str
+    prior: str
+    seed: int
+    number: int
+    status: str
+    iterations: int
+    expansions: int
+    attempts: int
+    seconds: float
+    first_order_failed: bool
+
+    @property
+    def solved(self) -> bool:
+        return self.status == "SOLVED"
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a comparison gave.
+
+    Attributes:
+        runs: one a cell and problem, in the order of `Comparison.cells`.
+        image_blind: share of the problems on which the best fixed order of the training problems fails, or None.
+        image_blind_order: that order.
+    """
+
+    comparison: Comparison
+    runs: tuple[Run, ...]
+    image_blind: float | None = None
+    image_blind_order: tuple[str, ...] = ()
+
+
+def ask_priors(
+    comparison: Comparison,
+    *,
+    workers: int = 1,
+    loaded: Mapping[str, Prior] | None = None,
+    leave_out: Callable[[str, InputError], None] | None = None,
+    progress: Progress | None = None,
+) -> dict[str, list[OrderScores] | None]:
+    """Each prior's scores for all problems, asked in one batch; pictures are taken once.
+
+    Args:
+        loaded: priors that are loaded already, by their names in the comparison.
+        leave_out: called with the name of a prior that does not know these problems, and what it said; the prior is
+            then missing in the answer. None lets the error pass.
+        progress: called with (done, total) pictures.
+    """
+    family = load_domain(comparison.domain)
+    found: dict[str, list[OrderScores] | None] = {}
+    problems: list[Problem] | None = None
+    for name in comparison.priors:
+        if name == NO_PRIOR:
+            found[name] = None
+            continue
+        if problems is None:
+            problems = [family.problem(n, **comparison.options) for n in comparison.numbers]
+            # Whether a prior looks at pictures is its own business; these two are known not to.
+            if set(comparison.priors) - {NO_PRIOR, "uniform", "random"}:
+                problems = family.observed(problems, workers=workers, progress=progress)
+        try:
+            found[name] = load_prior((loaded or {}).get(name, name)).scores(problems)
+        except InputError as error:
+            if leave_out is None:
+                raise
+            leave_out(name, error)
+    return found
+
+
+def run(
+    comparison: Comparison,
+    scores: Mapping[str, Sequence[OrderScores] | None] | None = None,
+    *,
+    workers: int | None = 1,
+    engine: str = "local",
+    address: str | None = None,
+    journal: str | Path | None = None,
+    progress: Progress | None = None,
+) -> tuple[Run, ...]:
+    """All runs of a comparison; the same, times excepted, for any number of workers.
+
+    Args:
+        scores: what `ask_priors` gives; None asks.
+        workers, engine, address: where problems are solved, see `neurosym.experiments.engines.run_tasks`.
+        journal: file (JSON lines) that keeps finished runs; those it has are not run again.
+        progress: called with (done, total) runs.
+
+    Raises:
+        ContractError: a planner's plan does not survive its replay.
+    """
+    scores = ask_priors(comparison, workers=min(workers or cores(), cores())) if scores is None else scores
+    kept = Journal(journal)
+    done: dict[tuple[Cell, int], Run] = {}
+    jobs = []
+    for position, number in enumerate(comparison.numbers):
+        own = {name: None if given is None else given[position] for name, given in scores.items()}
+        keys = {cell: _key(comparison, cell, number, own[cell[1]]) for cell in comparison.cells}
+        for cell, key in keys.items():
+            if key in kept:
+                done[cell, number] = Run(**kept[key])
+        missing = {cell: key for cell, key in keys.items() if key not in kept}
+        if missing:
+            jobs.append((comparison, number, missing, own))
+    total = len(comparison.numbers) * len(comparison.cells)
+    if progress is not None:
+        progress(len(done), total)
+    # Processes, not threads: FCL holds the interpreter's lock. Problems are rebuilt there; FCL's objects cannot travel.
+    solved = run_tasks(lambda job: _solve_one(*job), jobs, engine=engine, workers=workers, address=address)
+    for _, finished in solved:
+        kept.add({key: asdict(result) for key, result in finished})
+        for _, result in finished:
+            done[(result.planner, result.prior, result.seed), result.number] = result
+        if progress is not None:
+            progress(len(done), total)
+    return tuple(done[cell, number] for cell in comparison.cells for number in comparison.numbers)
+
+
+def image_blind(comparison: Comparison, *, split: int = 0) -> tuple[float, tuple[str, ...]] | None:
+    """The share of the compared problems that the best fixed order fails on, and that order.
+
+    The order is the one that fails least on the training problems (by geometry); nothing is looked at. None where
+    the family's problems do not share their actions.
+    """
+    family = load_domain(comparison.domain)
+    training = [p.ground() for p in family.problems("train", split=split, **comparison.options)]
+    order = best_fixed_order(training)
+    if order is None:
+        return None
+    failures = 0
+    for number in comparison.numbers:
+        problem = family.problem(number, **comparison.options)
+        if set(order) - set(problem.actions):
+            return None
+        with open_oracle(problem, comparison.oracle) as search:
+            failures += order_fails(search, [problem.actions.index(a) for a in order])
+    return failures / len(comparison.numbers), order
+
+
+def _solve_one(
+    comparison: Comparison, number: int, cells: Mapping[Cell, str], scores: Mapping[str, OrderScores | None]
+) -> list[tuple[str, Run]]:
+    """All the missing runs of one problem, so that its geometry is computed once."""
+    problem = load_domain(comparison.domain).problem(number, **comparison.options)
+    replayed: set[tuple[str, ...]] = set()
+    found = []
+    with open_oracle(problem, comparison.oracle) as search:
+        first = _FirstOrders(search, number, scores)
+        for (planner, prior, seed), key in cells.items():
+            own = scores[prior]
+            own = None if own is None else own.restricted(problem.actions) if own.actions else own
+            rng = np.random.default_rng([seed, number, zlib.crc32(planner.encode()), zlib.crc32(prior.encode())])
+            result = load_planner(planner).plan(search, own, budget=comparison.budget, rng=rng)
+            if result.plan is not None and result.plan not in replayed:
+                check_plan(problem, result.plan, comparison.oracle, planner)
+                replayed.add(result.plan)
+            counts = (result.iterations, result.expansions, result.attempts, round(result.seconds, 7))
+            failed = first.failed(prior, seed)
+            found.append((key, Run(planner, prior, seed, number, result.status.name, *counts, failed)))
+    return found
+
+
+class _FirstOrders:
+    """Whether the order a prior would try first is refused: asked by the benchmark itself, whatever planners do."""
+
+    def __init__(self, search: SearchProblem[Any], number: int, scores: Mapping[str, OrderScores | None]) -> None:
+        self.search, self.number, self.scores = search, number, scores
+        self.known: dict[tuple[str, int], bool] = {}
+
+    def failed(self, prior: str, seed: int) -> bool:
+        if (prior, seed) not in self.known:
+            rng = np.random.default_rng([seed, self.number, zlib.crc32(b"first order"), zlib.crc32(prior.encode())])
+            scores = self.scores[prior]
+            if scores is None:
+                order: Sequence[int] = [int(a) for a in rng.permutation(len(self.search.actions))]
+            elif scores.actions:
+                order = scores.restricted(self.search.actions).order(rng)
+            else:
+                order = scores.order(rng)
+            self.known[prior, seed] = order_fails(self.search, order)
+        return self.known[prior, seed]
+
+
+def _key(comparison: Comparison, cell: Cell, number: int, scores: OrderScores | None) -> str:
+    """What decides a run. The scores themselves are part of it: a prior that was trained anew is another prior."""
+    table = b"" if scores is None else scores.log_prob.tobytes() + repr(scores.actions).encode()
+    setting = (comparison.domain, number, dict(comparison.options), comparison.oracle, asdict(comparison.budget))
+    return key_of([RUNS_VERSION, __version__, *setting, *cell, hashlib.sha256(table).hexdigest()])

@@ -1,0 +1,167 @@
+"""How well orders read from pictures agree with demonstrated ones: shares for tables, counts for figures."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from neurosym.errors import InputError
+from neurosym.planning.demonstrations import Demonstrations
+
+#: How steps that are not taken are called, beside the classes.
+NONE = "none"
+
+
+def compare_orders(
+    predicted: ArrayLike, truth: Demonstrations, classes: Sequence[int]
+) -> dict[str, NDArray[np.float64]]:
+    """How well orders agree with demonstrated ones, where interchangeable actions count as one.
+
+    Args:
+        predicted: int (M, T), -1 after the last step.
+        truth: what was demonstrated, (M, T).
+        classes: one integer an action; equal ones are interchangeable.
+
+    Returns:
+        float64 (M,) each: `whole_sequence` (every step right, and no step too many), `per_step` (share of the
+        demonstrated steps that are right), `re_use` (an action comes twice), `stop_accuracy` (as many steps).
+    """
+    order = _checked(predicted, truth)
+    wanted = truth.sequences
+    right = kinds(order, classes) == kinds(wanted, classes)
+    taken = wanted >= 0
+    ordered = np.sort(order, axis=1)
+    twice = ((ordered[:, 1:] == ordered[:, :-1]) & (ordered[:, 1:] >= 0)).any(axis=1)
+    return {
+        "whole_sequence": right.all(axis=1).astype(float),
+        "per_step": (right & taken).sum(axis=1) / taken.sum(axis=1),
+        "re_use": twice.astype(float),
+        "stop_accuracy": ((order >= 0).sum(axis=1) == taken.sum(axis=1)).astype(float),
+    }
+
+
+def kinds(orders: NDArray[np.int64], classes: Sequence[int]) -> NDArray[np.int64]:
+    """int64 (M, T): the classes of the actions; -1 where there is none."""
+    kind = np.append(np.asarray(classes, dtype=np.int64), -1)  # index -1, no action, takes the last entry
+    found: NDArray[np.int64] = kind[orders]
+    return found
+
+
+def classes_of(given: Demonstrations) -> tuple[int, ...]:
+    """One integer an action, 0 to K - 1; actions of one class are interchangeable. Without classes, each is its own."""
+    return tuple(int(c) for c in np.unique(given.classes or range(len(given.actions)), return_inverse=True)[1])
+
+
+def seen_in(train: Demonstrations, test: Demonstrations) -> NDArray[np.bool_]:
+    """bool (M,): which test sequences, of classes, are among those of the training."""
+    known = {row.tobytes() for row in kinds(train.sequences, classes_of(train))}
+    return np.array([row.tobytes() in known for row in kinds(test.sequences, classes_of(test))])
+
+
+def averages(figures: Mapping[str, NDArray[np.float64]], seen: NDArray[np.bool_]) -> dict[str, float]:
+    """Means over all pictures, and of `whole_sequence` and `per_step` over those seen in training and not, apart.
+
+    Args:
+        figures: metric -> float64 (M,).
+        seen: bool (M,).
+    """
+    found = {metric: float(values.mean()) for metric, values in figures.items()}
+    for label, chosen in (("seen", seen), ("unseen", ~seen)):
+        found[f"{label}_share"] = float(chosen.mean())
+        if chosen.any():
+            for metric in ("whole_sequence", "per_step"):
+                found[f"{metric}_{label}"] = float(figures[metric][chosen].mean())
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class Counts:
+    """What figures are drawn from: K classes of actions, orders of at most T steps.
+
+    Attributes:
+        labels: the K names of the classes: colours, letters.
+        members: how many actions each has.
+        confusion: int64 (K + 1, K + 1): steps by the class demonstrated and the class read; the last is `NONE`.
+        right: int64 (T + 1, T + 1): pictures by the number of steps and of those that are right.
+        repeats: int64 (T, 4): by how many actions are of a class that came before in the sequence: steps, wrong
+            steps, pictures, wrong pictures.
+    """
+
+    labels: tuple[str, ...]
+    members: tuple[int, ...]
+    confusion: NDArray[np.int64]
+    right: NDArray[np.int64]
+    repeats: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, predicted: ArrayLike, truth: Demonstrations) -> Counts:
+        """Count orders, int (M, T), against the demonstrated ones."""
+        order, classes = _checked(predicted, truth), classes_of(truth)
+        labels = _class_names(truth.actions, classes)
+        k, steps = len(labels), order.shape[1]
+        read, wanted = kinds(order, classes), kinds(truth.sequences, classes)
+        confusion = np.zeros((k + 1, k + 1), dtype=np.int64)
+        np.add.at(confusion, (wanted, read), 1)  # -1, no action, is the last
+        taken = wanted >= 0
+        length = taken.sum(axis=1)
+        correct = ((read == wanted) & taken).sum(axis=1)
+        right = np.zeros((steps + 1, steps + 1), dtype=np.int64)
+        np.add.at(right, (length, correct), 1)
+        repeated = length - np.array([len(set(row[row >= 0])) for row in wanted])
+        wrong = (read != wanted).any(axis=1)
+        repeats = np.zeros((steps, 4), dtype=np.int64)
+        np.add.at(repeats, repeated, np.stack([length, length - correct, np.ones_like(length), wrong], axis=1))
+        members = tuple(int(n) for n in np.bincount(classes, minlength=k))
+        return cls(labels, members, confusion, right, repeats)
+
+    @classmethod
+    def pooled(cls, given: Iterable[Counts]) -> Counts:
+        """Those of several trials, added up."""
+        everyone = list(given)
+        first = everyone[0]
+        if len({(c.labels, c.members, c.right.shape) for c in everyone}) > 1:
+            raise InputError("Expected counts of the same classes and steps to add up; got different ones.")
+        return cls(
+            first.labels,
+            first.members,
+            np.sum([c.confusion for c in everyone], axis=0),
+            np.sum([c.right for c in everyone], axis=0),
+            np.sum([c.repeats for c in everyone], axis=0),
+        )
+
+    def to_json(self) -> dict[str, Any]:
+        return {
+            "labels": list(self.labels),
+            "members": list(self.members),
+            "confusion": self.confusion.tolist(),
+            "right": self.right.tolist(),
+            "repeats": self.repeats.tolist(),
+        }
+
+    @classmethod
+    def from_json(cls, given: Mapping[str, Any]) -> Counts:
+        arrays = (np.array(given[name], dtype=np.int64) for name in ("confusion", "right", "repeats"))
+        return cls(tuple(given["labels"]), tuple(given["members"]), *arrays)
+
+
+def _checked(predicted: ArrayLike, truth: Demonstrations) -> NDArray[np.int64]:
+    order = np.asarray(predicted, dtype=np.int64)
+    if order.shape != truth.sequences.shape:
+        raise InputError(f"Expected predicted orders of shape {truth.sequences.shape}; got {order.shape}.")
+    return order
+
+
+def _class_names(actions: Sequence[str], classes: Sequence[int]) -> tuple[str, ...]:
+    """What the names of a class's actions share once their numbers are cut off, if that tells the classes apart."""
+    stems: list[set[str]] = [set() for _ in range(max(classes) + 1)]
+    for action, kind in zip(actions, classes):
+        stems[kind].add(re.sub(r"[-_ ]?\d+$", "", action) or action)
+    names = [stem for own in stems if len(own) == 1 for stem in own]
+    if len(set(names)) == len(stems):
+        return tuple(names)
+    return tuple(actions[classes.index(kind)] for kind in range(len(stems)))

@@ -1,0 +1,257 @@
+"""Rebuild an experiment of the paper: train on each split, test on its other half, and say what came beside the paper.
+
+Every finished training and comparison is kept, so a run that was killed goes on where it was.
+"""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from neurosym import __version__
+from neurosym.errors import InputError, UnknownNameError
+from neurosym.experiments import benchmark
+from neurosym.experiments.benchmark import Comparison, Outcome
+from neurosym.experiments.csv_lines import Record
+from neurosym.experiments.engines import connection, cores, run_tasks
+from neurosym.experiments.planning_report import report, write_results
+from neurosym.planning.problem_family import Progress
+from neurosym.registry import load_domain, load_prior
+from neurosym.support.files import write_text, written_whole
+
+__all__ = ["Cell", "Experiment", "report", "reproduce", "soma_experiment", "train_cell"]
+
+#: Called with one line about what is going on.
+Say = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """What is rebuilt.
+
+    Attributes:
+        domain: the problem family.
+        splits: random splits into train and test, 0 .. splits - 1; each is trained and tested once.
+        styles: styles of pictures; trained and tested on the same style.
+        methods: priors that are trained.
+        planners: planners that use them.
+        repeats: how often each test problem is planned.
+        seed: of pictures and training.
+        epochs: None takes each recipe's.
+        tests: how many problems of each test half are planned; None plans all.
+    """
+
+    domain: str
+    splits: int = 5
+    styles: tuple[str, ...] = ("clean", "varied")
+    methods: tuple[str, ...] = ("sinkhorn", "tcn", "sinkhorn-paper", "tcn-paper")
+    planners: tuple[str, ...] = ("swap-repair", "backtracking", "best-first")
+    repeats: int = 5
+    seed: int = 0
+    epochs: int | None = None
+    tests: int | None = None
+
+    def __post_init__(self) -> None:
+        if self.splits < 1 or not (self.styles and self.methods and self.planners):
+            raise InputError("Expected at least one split, style, method and planner; got none of one.")
+
+
+#: The paper splits the cubes 100 times.
+SCALES: Mapping[str, Mapping[str, Any]] = MappingProxyType({"quick": {"splits": 3}, "paper": {"splits": 100}})
+
+
+def soma_experiment(scale: str = "quick") -> Experiment:
+    """The paper's Table II: change it with `dataclasses.replace`.
+
+    Args:
+        scale: ``"quick"``, within 15 minutes on two cores, or ``"paper"``, as large as the paper's.
+    """
+    if scale not in SCALES:
+        raise UnknownNameError("scale", scale, SCALES)
+    return Experiment("soma", **SCALES[scale])
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One training: a method on a style of pictures and a split."""
+
+    style: str
+    method: str
+    split: int
+
+    def path(self, out: Path) -> Path:
+        return out / "weights" / f"{self.style}-{self.method}-split{self.split}.safetensors"
+
+
+def reproduce(
+    experiment: Experiment,
+    out: Path,
+    *,
+    workers: int | None = 1,
+    engine: str = "local",
+    address: str | None = None,
+    say: Say = lambda _: None,
+    progress: Progress = lambda done, total: None,
+) -> list[Record]:
+    """Train what is not trained yet, compare, and write results.csv, report.md and iterations.png into `out`.
+
+    Args:
+        workers, engine, address: where networks are trained and problems solved, see `engines.run_tasks`.
+        say: told what is going on.
+        progress: called with (done, total) trainings and comparisons.
+    """
+    _same_experiment(experiment, out)
+    cells = [
+        Cell(style, method, split)
+        for split in range(experiment.splits)
+        for style in experiment.styles
+        for method in experiment.methods
+    ]
+    total = len(cells) + experiment.splits * len(experiment.styles)
+    missing = [c for c in cells if not c.path(out).exists()]
+    say(f"{len(cells) - len(missing)} of {len(cells)} networks are trained already.")
+    progress(len(cells) - len(missing), total)
+    records: list[Record] = []
+    outcomes: dict[tuple[str, int], Outcome] = {}
+    with connection(engine, address):
+        run = partial(run_tasks, engine=engine, workers=workers, address=address)
+        if engine == "local":
+            _make_demonstrations(experiment, missing, say)
+        for done, line in enumerate(_train_all(experiment, missing, out, run, keep=engine == "local"), 1):
+            say(f"[{len(cells) - len(missing) + done}/{len(cells)}] {line}")
+            progress(len(cells) - len(missing) + done, total)
+        for style in experiment.styles:
+            for split in range(experiment.splits):
+                outcome = _compare(experiment, style, split, out, engine=engine, workers=workers, address=address)
+                outcomes[style, split] = outcome
+                records += _records(experiment, outcome, style, split, out)
+                say(f"{style} pictures, split {split}: compared.")
+                progress(len(cells) + len(outcomes), total)
+    write_results(experiment, records, outcomes, out)
+    return records
+
+
+def train_cell(experiment: Experiment, cell: Cell, checkpoint: Path | None) -> tuple[bytes, float]:
+    """Train one network: the content of its weights file, and the seconds it took.
+
+    Args:
+        checkpoint: lets a training that was killed go on; it stays. None begins anew.
+    """
+    learner: Any = load_prior(cell.method)
+    given = load_domain(experiment.domain).demonstrations(
+        "train", split=cell.split, recipe=_recipe(cell.method), style=cell.style, seed=experiment.seed
+    )
+    learner.fit(given, seed=experiment.seed, epochs=experiment.epochs, checkpoint=checkpoint)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "weights.safetensors"
+        learner.save(path, notes={"split": cell.split, "pictures": cell.style, "seed": experiment.seed})
+        return path.read_bytes(), float(learner.header["training"]["seconds"])
+
+
+def _train_all(
+    experiment: Experiment, missing: Sequence[Cell], out: Path, run: Callable[..., Any], *, keep: bool
+) -> Iterator[str]:
+    """Train, and write each network's weights here, whoever trained it; a line about each.
+
+    Args:
+        keep: whether a network's checkpoint is kept beside its weights: other machines do not see them.
+    """
+
+    def checkpoint(cell: Cell) -> Path | None:
+        return cell.path(out).absolute().with_suffix(".checkpoint") if keep else None
+
+    (out / "weights").mkdir(parents=True, exist_ok=True)
+    for cell, (weights, seconds) in run(lambda c: train_cell(experiment, c, checkpoint(c)), missing):
+        with written_whole(cell.path(out)) as file:
+            file.write(weights)
+        cell.path(out).with_suffix(".checkpoint").unlink(missing_ok=True)
+        yield f"{cell.method}, {cell.style} pictures, split {cell.split}: {seconds:.0f} s"
+
+
+def _make_demonstrations(experiment: Experiment, missing: Sequence[Cell], say: Say) -> None:
+    """Pictures and labels are kept on disk by the family; made first, each is made once, on all processors."""
+    family = load_domain(experiment.domain)
+    for style, split, recipe in sorted({(c.style, c.split, _recipe(c.method)) for c in missing}):
+        say(f"demonstrations: {style} pictures, split {split}, recipe {recipe}")
+        family.demonstrations("train", split=split, recipe=recipe, style=style, seed=experiment.seed)
+
+
+def _recipe(method: str) -> str:
+    """The recipe of demonstrations that a method learns from, as its prior says."""
+    return str(getattr(load_prior(method), "labels", "full"))
+
+
+def _compare(
+    experiment: Experiment,
+    style: str,
+    split: int,
+    out: Path,
+    *,
+    workers: int | None,
+    engine: str,
+    address: str | None,
+) -> Outcome:
+    family = load_domain(experiment.domain)
+    numbers = tuple(family.numbers("test", split=split))[: experiment.tests]
+    comparison = Comparison(
+        domain=experiment.domain,
+        numbers=numbers,
+        planners=experiment.planners,
+        priors=("random", *experiment.methods),
+        options={"pictures": style, "seed": experiment.seed},
+        seeds=experiment.repeats,
+    )
+    here = min(workers or cores(), cores())
+    problems = family.observed([family.problem(n, **comparison.options) for n in numbers], workers=here)
+    scores = {m: load_prior(Cell(style, m, split).path(out)).scores(problems) for m in experiment.methods}
+    scores["random"] = load_prior("random").scores(problems)
+    journal = out / f"runs-{style}-{split}.jsonl"
+    runs = benchmark.run(comparison, scores, workers=workers, engine=engine, address=address, journal=journal)
+    blind = benchmark.image_blind(comparison, split=split)
+    return Outcome(comparison, runs, *(blind or (None, ())))
+
+
+def _records(experiment: Experiment, outcome: Outcome, style: str, split: int, out: Path) -> list[Record]:
+    found = []
+    n = len(outcome.comparison.numbers)
+
+    def add(method: str, metric: str, value: Any) -> None:
+        found.append(Record(experiment.domain, style, method, n, split, metric, float(value)))
+
+    for method in outcome.comparison.priors:
+        runs = [r for r in outcome.runs if r.prior == method]
+        add(method, "initial_failures", np.mean([r.first_order_failed for r in runs]))
+        for planner in experiment.planners:
+            own = [r.iterations for r in runs if r.planner == planner]
+            add(method, f"iterations {planner}", np.mean(own))
+            add(method, f"iterations_std {planner}", np.std(own))
+        if method in experiment.methods:
+            header = load_prior(Cell(style, method, split).path(out)).header  # type: ignore[attr-defined]
+            add(method, "training_seconds", header["training"]["seconds"])
+    if outcome.image_blind is not None:
+        add("blind", "initial_failures", outcome.image_blind)
+    return found
+
+
+def _same_experiment(experiment: Experiment, out: Path) -> None:
+    """A folder belongs to one experiment: what another left there would be taken for finished."""
+    fixed = {"domain": experiment.domain, "seed": experiment.seed, "epochs": experiment.epochs, "version": __version__}
+    path = out / "experiment.json"
+    if path.exists():
+        try:
+            known = json.loads(path.read_text())
+        except ValueError:
+            known = None
+        if known != fixed:
+            raise InputError(
+                f"Expected {out} to be empty or to hold this experiment, {fixed}; it holds {known}. Name another."
+            )
+    write_text(path, json.dumps(fixed) + "\n")

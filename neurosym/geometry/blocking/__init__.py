@@ -1,0 +1,1 @@
+"""What stands in the way of what, along straight lines: the directional blocking graph."""

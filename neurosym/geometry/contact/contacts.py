@@ -1,0 +1,258 @@
+"""Where parts touch: points, normals and areas.
+
+Bounds say which bodies are near. Two boxes with the same axes are compared as intervals; of all other pairs the
+triangles that lie in one plane, with opposite normals, are clipped against one another. Pairs that have none such,
+and of which FCL says that they touch all the same, touch where their faces nearly lie in one plane. All pairs are
+handled at once.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from scipy.spatial import ConvexHull, QhullError
+
+from neurosym.geometry.contact import collision
+from neurosym.geometry.contact.surfaces import GRID, Surfaces
+from neurosym.geometry.mesh.broad_phase import Pairs, overlapping_pairs, spans
+
+if TYPE_CHECKING:
+    from neurosym.geometry.assembly import Assembly
+
+Array = NDArray[np.float64]
+Numbers = NDArray[np.int64]
+
+#: Stands for the table where a body is expected.
+TABLE = -1
+
+
+@dataclass(frozen=True, eq=False)
+class Contact:
+    """A flat patch in which body `a` touches body `b` of another part, or the table.
+
+    Attributes:
+        a, b: numbers of bodies; `b` is `TABLE` for the table.
+        points: float64 (k, 3), k >= 3: the corners of the patch's convex hull, in the world.
+        normal: float64 (3,): unit normal of the patch, from a to b.
+        area: of the patch (length squared).
+    """
+
+    a: int
+    b: int
+    points: Array
+    normal: Array
+    area: float
+
+
+def find_contacts(assembly: Assembly) -> tuple[Contact, ...]:
+    """All contacts of an assembly, the table's first, then by bodies."""
+    bounds, touch = assembly.body_bounds, assembly.touch
+    near = overlapping_pairs(bounds[:, 0] - touch, bounds[:, 1] + touch, assembly.owners)
+    aligned = _same_axes(assembly, near)
+    found = _box_contacts(assembly, near[aligned])
+    others = near[~aligned]
+    if len(others):
+        found += _facet_contacts(assembly, others, assembly.tolerances.parallel, touch)
+        done = {(c.a, c.b) for c in found}
+        left = [(int(a), int(b)) for a, b in others if (a, b) not in done]
+        rounded = [pair for pair in left if _touching(assembly, *pair)]
+        if rounded:
+            found += _facet_contacts(assembly, np.array(rounded), assembly.tolerances.mate_angle, assembly.mate)
+    return tuple(_table_contacts(assembly) + sorted(found, key=lambda c: (c.a, c.b)))
+
+
+def _touching(assembly: Assembly, a: int, b: int) -> bool:
+    """Whether the surfaces of two bodies come within the touching tolerance, by FCL."""
+    objects = assembly.remember("collision objects", lambda: dict[int, object]())
+    for body in (a, b):
+        if body not in objects:
+            objects[body] = collision.shape_object(assembly.bodies[body].shape, assembly.X_WB[body])
+    first, second = objects[a], objects[b]
+    return collision.collide(first, second) or collision.distance(first, second) <= assembly.touch
+
+
+def near_pairs(bounds: Array, owners: Numbers, margin: float) -> list[tuple[int, int]]:
+    """Pairs a < b of bodies of different parts whose bounds (n, 2, 3) come within `margin`."""
+    pairs = overlapping_pairs(bounds[:, 0] - margin, bounds[:, 1] + margin, owners)
+    return [(int(a), int(b)) for a, b in pairs]
+
+
+def _same_axes(assembly: Assembly, pairs: Pairs) -> NDArray[np.bool_]:
+    """Which pairs are two boxes with parallel axes, bool (k,)."""
+    boxes = assembly.is_box[pairs].all(axis=1)
+    R = assembly.X_WB[:, :3, :3]
+    sines = np.sort(np.abs(np.swapaxes(R[pairs[:, 0]], 1, 2) @ R[pairs[:, 1]]), axis=2)[:, :, :2]
+    parallel = np.linalg.norm(sines, axis=2).max(axis=1, initial=0.0) <= assembly.tolerances.parallel
+    return np.asarray(boxes & parallel)
+
+
+def _box_contacts(assembly: Assembly, pairs: Pairs) -> list[Contact]:
+    """Contacts of boxes with parallel axes, pairs (k, 2): in the first box's frame all is intervals."""
+    if not len(pairs):
+        return []
+    touch = assembly.touch
+    a, b = pairs.T
+    X = assembly.X_WB
+    R = X[a, :3, :3]
+    across = np.swapaxes(R, 1, 2)
+    half_a = assembly.box_sizes[a] / 2
+    half_b = np.einsum("kij,kj->ki", np.abs(across @ X[b, :3, :3]).round(), assembly.box_sizes[b]) / 2
+    centre = np.einsum("kij,kj->ki", across, X[b, :3, 3] - X[a, :3, 3])
+    low, high = np.maximum(-half_a, centre - half_b), np.minimum(half_a, centre + half_b)
+    overlap = high - low
+    flat = overlap <= assembly.mate
+    axis = flat.argmax(axis=1)
+    found = []
+    for k in np.flatnonzero((flat.sum(axis=1) == 1) & (overlap >= -touch).all(axis=1)):
+        n = int(axis[k])
+        u, v = (n + 1) % 3, (n + 2) % 3
+        sign = 1.0 if centre[k, n] > 0 else -1.0
+        corners = np.zeros((4, 3))
+        corners[:, n] = sign * half_a[k, n]
+        corners[:, u] = low[k, u], high[k, u], high[k, u], low[k, u]
+        corners[:, v] = low[k, v], low[k, v], high[k, v], high[k, v]
+        points = corners @ R[k].T + X[a[k], :3, 3]
+        area = float(overlap[k, u] * overlap[k, v])
+        found.append(Contact(int(a[k]), int(b[k]), points, sign * R[k, :, n], area))
+    return found
+
+
+def _table_contacts(assembly: Assembly) -> list[Contact]:
+    if not assembly.has_table:
+        return []
+    down = np.array([0.0, 0.0, -1.0])
+    reach = assembly.ground + assembly.touch
+    found = []
+    for i in np.flatnonzero(assembly.body_bounds[:, 0, 2] <= reach):
+        vertices = assembly.body_vertices(int(i))
+        points = hull_points(vertices[vertices[:, 2] <= reach], down)
+        area = _area(points, down)
+        if _is_wide(points, area, assembly.touch):
+            found.append(Contact(int(i), TABLE, points, down, area))
+    return found
+
+
+def _area(points: Array, normal: Array) -> float:
+    """Area of a convex polygon with corners (k, 3) in order."""
+    if len(points) < 3:
+        return 0.0
+    arms = points - points.mean(axis=0)
+    return 0.5 * abs(float(np.cross(arms, np.roll(arms, -1, axis=0)).sum(axis=0) @ normal))
+
+
+def _is_wide(points: Array, area: float, touch: float) -> bool:
+    """Whether a patch is wider than the tolerance: edges and corners that meet are no contact."""
+    return len(points) >= 3 and area > touch * float(np.linalg.norm(np.ptp(points, axis=0)))
+
+
+def hull_points(points: Array, normal: Array) -> Array:
+    """Corners, in order, of the convex hull of coplanar points (n, 3); empty when they span no area."""
+    if len(points) < 3:
+        return points[:0]
+    u, v = plane_axes(normal)
+    flat = np.stack([points @ u, points @ v], axis=1)
+    try:
+        corners: Array = points[ConvexHull(flat).vertices]
+        return corners
+    except QhullError:
+        return points[:0]
+
+
+def plane_axes(normal: Array) -> tuple[Array, Array]:
+    """Two unit vectors (3,) that span the plane across a unit normal."""
+    helper = np.eye(3)[np.argmin(np.abs(normal))]
+    u = np.cross(normal, helper)
+    u /= np.linalg.norm(u)
+    return u, np.cross(normal, u)
+
+
+def _facet_contacts(assembly: Assembly, pairs: Pairs, sine: float, gap: float) -> list[Contact]:
+    """Contacts of bodies by clipping triangles that face one another, all pairs (k, 2) at once.
+
+    Args:
+        sine: of the angle up to which normals count as opposite.
+        gap: how far apart (length) the faces may be; an overlap may be as deep as `tolerances.mate` says.
+    """
+    surfaces = Surfaces.of(assembly)
+    i, j = _facing(assembly, surfaces, pairs, sine, gap).T
+    planes = _planes(assembly, surfaces, i, j, max(sine, 1e-3))
+    if not planes:
+        return []
+    number = np.repeat(np.arange(len(planes)), [len(members) for members in planes])
+    i, j = (t[np.concatenate(planes)] for t in (i, j))
+    starts = np.flatnonzero(np.diff(number, prepend=-1))
+    origins = surfaces.middles[i[starts]]
+    normals = np.add.reduceat(surfaces.normals[i] - surfaces.normals[j], starts)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    axes = np.array([np.stack(plane_axes(n), axis=1) for n in normals])  # (planes, 3, 2)
+    shadows = [(surfaces.triangles[t] - origins[number][:, None]) @ axes[number] for t in (i, j)]
+    clipped = shapely.intersection(*map(shapely.polygons, shadows), grid_size=GRID * assembly.touch)
+    areas = shapely.area(clipped)
+    kept = np.flatnonzero(areas > 0)
+    number, clipped, areas = number[kept], clipped[kept], areas[kept]
+    # Where a line along the normal, through the middle of the patch, meets one plane and the other.
+    middle = origins[number] + np.einsum("kde,ke->kd", axes[number], shapely.get_coordinates(shapely.centroid(clipped)))
+    heights = [
+        np.einsum("kd,kd->k", surfaces.normals[t], surfaces.middles[t] - middle)
+        / np.einsum("kd,kd->k", surfaces.normals[t], normals[number])
+        for t in (i[kept], j[kept])
+    ]
+    apart = heights[1] - heights[0]
+    near = (apart <= gap) & (apart >= -assembly.mate)
+    number, clipped, areas = number[near], clipped[near], areas[near]
+    total = np.bincount(number, areas, len(planes))
+    uv, source = shapely.get_coordinates(clipped, return_index=True)
+    found = []
+    for k, corners in _hulls(uv, number[source], 1e-2 * assembly.touch):
+        points = origins[k] + corners @ axes[k].T
+        if _is_wide(points, _area(points, normals[k]), assembly.touch):
+            a, b = surfaces.body[i[starts[k]]], surfaces.body[j[starts[k]]]
+            found.append(Contact(int(a), int(b), points, normals[k], float(total[k])))
+    return found
+
+
+def _facing(assembly: Assembly, surfaces: Surfaces, pairs: Pairs, sine: float, gap: float) -> Pairs:
+    """Pairs of triangles, the first of the lower body, that are near and face each other, int64 (k, 2)."""
+    # Only what reaches into the bounds of the other body of a pair can touch it.
+    ways = np.concatenate([pairs, pairs[:, ::-1]])
+    run, place = spans(np.diff(surfaces.first)[ways[:, 0]])
+    candidate = surfaces.first[ways[run, 0]] + place
+    bounds = assembly.body_bounds[ways[run, 1]]
+    low, high = surfaces.triangles.min(axis=1) - gap, surfaces.triangles.max(axis=1) + gap
+    inside = (low[candidate] <= bounds[:, 1]).all(axis=1) & (high[candidate] >= bounds[:, 0]).all(axis=1)
+    near = np.unique(candidate[inside])
+    i, j = near[overlapping_pairs(low[near], high[near], assembly.owners[surfaces.body[near]])].T
+    n = len(assembly.bodies)
+    kept = np.isin(surfaces.body[i] * n + surfaces.body[j], pairs[:, 0] * n + pairs[:, 1])
+    kept &= np.einsum("kd,kd->k", surfaces.normals[i], surfaces.normals[j]) < 0
+    kept &= np.linalg.norm(np.cross(surfaces.normals[i], surfaces.normals[j]), axis=1) <= sine
+    return np.stack([i[kept], j[kept]], axis=1)
+
+
+def _planes(assembly: Assembly, surfaces: Surfaces, i: Numbers, j: Numbers, sine: float) -> list[Numbers]:
+    """Facing pairs of triangles gathered by pair of bodies and, in it, by the plane of the first triangle."""
+    points, normals = surfaces.middles[i], surfaces.normals[i]
+    keys = surfaces.body[i] * len(assembly.bodies) + surfaces.body[j]
+    order = np.argsort(keys, kind="stable")
+    found = []
+    for left in np.split(order, np.flatnonzero(np.diff(keys[order])) + 1):
+        while len(left):
+            same = normals[left] @ normals[left[0]] > 1 - sine**2 / 2
+            same &= np.abs((points[left] - points[left[0]]) @ normals[left[0]]) <= 2 * assembly.mate
+            found.append(left[same])
+            left = left[~same]
+    return found
+
+
+def _hulls(uv: Array, group: Numbers, noise: float) -> list[tuple[int, Array]]:
+    """Corners of the convex hull of each group of points in the plane; those less than `noise` off an edge go."""
+    if not len(uv):
+        return []
+    order = np.argsort(group, kind="stable")
+    present, number = np.unique(group[order], return_inverse=True)
+    hulls = shapely.simplify(shapely.convex_hull(shapely.multipoints(uv[order], indices=number)), noise)
+    return [(int(k), shapely.get_coordinates(h)[:-1]) for k, h in zip(present, hulls) if h.geom_type == "Polygon"]

@@ -1,0 +1,1 @@
+"""Triangles, topology and bounds. No module here knows what a part is."""

@@ -1,0 +1,1 @@
+"""Ways out that are no straight line: lattices, moves of voxel parts, and sampling (OMPL)."""

@@ -1,0 +1,286 @@
+"""Paths for parts that no straight line takes out: a lattice of translations, then OMPL.
+
+Searches are counted in checks of poses, not in seconds, so the same seed gives the same path on any machine. OMPL's
+own random numbers have one seed a process, set anew for each search from the caller's generator (generators made by
+OMPL afterwards, in another's code, then follow from it, too). No path leaves here that `Path.check` has not confirmed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from neurosym.errors import InputError
+from neurosym.geometry.paths.lattice import Lattice
+from neurosym.geometry.paths.path import Kind, Path
+from neurosym.geometry.paths.removal import OutOfBudget, Removal
+from neurosym.geometry.rigid_motions import Motion, shifted
+
+if TYPE_CHECKING:
+    from neurosym.geometry.assembly import Assembly
+
+Array = NDArray[np.float64]
+
+#: What `extract` tries, in this order.
+KINDS: tuple[Kind, ...] = ("lattice", "translation", "rigid")
+
+#: How far trees of translations and of rigid motions grow at once, in smallest extents (plus radians), attempt by
+#: attempt: measured on narrow slots and a hook, where longer steps miss the way in and shorter ones arrive late.
+RANGES: dict[Kind, tuple[float, ...]] = {"translation": (1.0, 0.5, 2.0), "rigid": (1.0, 0.3, 2.0)}
+
+#: How far apart OMPL checks a motion, in smallest extents; each new attempt halves it.
+RESOLUTION = 0.05
+
+#: The share of the budget of a search over rigid motions that goes to quarter turns on the lattice, before the trees.
+TURNS_SHARE = 0.25
+
+#: Shortcuts tried on a path that a tree has found.
+SHORTCUTS = 60
+
+
+@dataclass(frozen=True)
+class Failure:
+    """No path was found.
+
+    Attributes:
+        reason: why, in a sentence.
+        because: names of the parts that were in the way, the most frequent first.
+        proved: whether no translations, however many and in whatever directions, take the parts out. Motions that turn
+            are never ruled out.
+        checks: poses and ways asked.
+    """
+
+    reason: str
+    because: tuple[str, ...]
+    proved: bool
+    checks: int
+
+
+def extract(
+    assembly: Assembly,
+    moving: int,
+    among: int,
+    *,
+    rng: np.random.Generator,
+    ground: float | None = None,
+    kinds: Sequence[Kind] = KINDS,
+    max_checks: int = 200_000,
+    seconds: float | None = None,
+) -> Path | Failure:
+    """A path that takes parts, moving as one, out from among others.
+
+    They are out when a plane across one of the axes divides them from the others. Straight lines are not asked first:
+    `Assembly.blocking` knows them.
+
+    Args:
+        moving: a bitset of the parts that leave together.
+        among: a bitset of the parts that are there.
+        rng: for the searches with OMPL.
+        ground: height (z, world) of a plane that nothing goes below; None: there is none.
+        kinds: which searches to try, in this order: "lattice" and "translation" never turn the parts, "rigid" does.
+        max_checks: how many poses and ways each kind of search may ask.
+        seconds: a limit of time besides, for each kind; where it ends a search, another run may end elsewhere.
+
+    Raises:
+        InputError: a kind that there is not, or parts that move without others that stay.
+    """
+    for kind in kinds:
+        if kind not in KINDS:
+            raise InputError(f"Expected kinds of search among {', '.join(KINDS)}; got {kind!r}.")
+    if not moving or not among & ~moving:
+        raise InputError("Expected parts that move and others that stay; one of the two is empty.")
+    met: dict[int, int] = {}
+    proved, checks = False, 0
+    reasons = []
+    for kind in kinds:
+        removal = Removal(assembly, moving, among, ground, max_checks, seconds)
+        try:
+            if kind == "lattice":
+                lattice = Lattice(removal)
+                poses = lattice.search()
+                if poses is None:
+                    proved = lattice.complete
+                    reasons.append("no translations lead out" if proved else "no way out on the lattice")
+            elif proved and kind == "translation":
+                continue
+            else:
+                poses = _turned(removal, max_checks) if kind == "rigid" else None
+                poses = poses or _grown(removal, kind, rng)
+        except OutOfBudget:
+            poses = None
+        if poses is not None:
+            path = removal.path(kind, poses)
+            check = path.check(assembly, among, ground=ground)
+            if check.holds:
+                return path
+            reasons.append(f"the path of kind {kind!r} did not pass its check: {check.reason}")
+        elif removal.spent():
+            reasons.append(f"the search of kind {kind!r} ran out of its budget after {removal.checks:,} checks")
+        elif kind != "lattice":
+            reasons.append(f"no attempt of kind {kind!r} found a way out")
+        checks += removal.checks
+        for part, count in removal.met.items():
+            met[part] = met.get(part, 0) + count
+    names = tuple(assembly.names[p] for p, _ in sorted(met.items(), key=lambda item: (-item[1], item[0])))
+    said = "; ".join(reasons)
+    return Failure(f"{', '.join(assembly.in_mask(moving))}: {said}.", names, proved, checks)
+
+
+def _turned(removal: Removal, max_checks: int) -> list[Array] | None:
+    """Poses of a way out on the lattice with quarter turns, for a part of the budget; None: none was found."""
+    removal.max_checks = int(TURNS_SHARE * max_checks)
+    try:
+        return Lattice(removal, turns=True).search()
+    except OutOfBudget:
+        return None
+    finally:
+        removal.max_checks = max_checks
+
+
+def _grown(removal: Removal, kind: Kind, rng: np.random.Generator) -> list[Array] | None:
+    """Poses of a way out that a random tree found, made shorter and confirmed without gaps; None: none was."""
+    ranges = RANGES[kind]
+    for attempt, length in enumerate(ranges):
+        until = removal.checks + (removal.max_checks - removal.checks) // (len(ranges) - attempt)
+        seed = int(rng.integers(1, 2**31 - 1))
+        poses = _tree(removal, kind == "rigid", length, RESOLUTION / 2**attempt, until, seed)
+        if poses is None:
+            continue
+        if all(removal.is_clear(Motion(a, b, removal.centre)) for a, b in pairwise(poses)):
+            return _shortened(removal, poses, rng)
+        if removal.spent():
+            return None
+    return None
+
+
+def _tree(
+    removal: Removal, turning: bool, length: float, resolution: float, max_checks: int, seed: int
+) -> list[Array] | None:
+    """One attempt with OMPL: RRTConnect towards places outside, or RRT over rigid motions until it is out.
+
+    States are where the moving parts' centre is, from its assembled place, in smallest extents, and its rotation.
+    """
+    from ompl import base, geometric, util
+
+    # OMPL logs to stdout, which belongs to the program that calls us.
+    util.setLogLevel(util.LogLevel.LOG_NONE)
+    util.RNG.setSeed(seed)
+    scale = removal.assembly.smallest_extent
+    space = base.SE3StateSpace() if turning else base.RealVectorStateSpace(3)
+    reach = float(np.linalg.norm(removal.own_points - removal.centre, axis=1).max()) + scale
+    low = (removal.other_points.min(axis=0) - reach - removal.centre) / scale
+    high = (removal.other_points.max(axis=0) + reach - removal.centre) / scale
+    bounds = base.RealVectorBounds(3)
+    for axis in range(3):
+        bounds.setLow(axis, float(low[axis]))
+        bounds.setHigh(axis, float(high[axis]))
+    space.setBounds(bounds)
+    setup = geometric.SimpleSetup(space)
+
+    def pose(state: Any) -> Array:
+        if not turning:
+            return shifted(scale * np.array([state[0], state[1], state[2]]))
+        q = state.rotation()
+        X = np.eye(4)
+        X[:3, :3] = _rotation(q.x, q.y, q.z, q.w)
+        at = removal.centre + scale * np.array([state.getX(), state.getY(), state.getZ()])
+        X[:3, 3] = at - X[:3, :3] @ removal.centre
+        return X
+
+    def is_free(state: Any) -> bool:
+        # OMPL takes a plain bool only.
+        return not removal.hit(pose(state))
+
+    setup.setStateValidityChecker(is_free)
+    start = space.allocState()
+    if turning:
+        start.setXYZ(0.0, 0.0, 0.0)
+        start.rotation().setIdentity()
+    else:
+        start[0], start[1], start[2] = 0.0, 0.0, 0.0
+    setup.setStartState(start)
+    information = setup.getSpaceInformation()
+    information.setStateValidityCheckingResolution(resolution / float(space.getMaximumExtent()))
+
+    class Out(base.GoalRegion):  # type: ignore[misc]
+        def distanceGoal(self, state: Any) -> float:
+            return removal.left(pose(state)) / scale
+
+    # Python must hold the goal: OMPL keeps no reference that counts.
+    if turning:
+        goal = Out(information)
+        goal.setThreshold(1e-9)
+        planner = geometric.RRT(information)
+    else:
+        goal = base.GoalStates(information)
+        for axis in range(3):
+            for edge in (low, high):
+                state = space.allocState()
+                state[0], state[1], state[2] = (float(edge[k]) if k == axis else 0.0 for k in range(3))
+                if is_free(state):
+                    goal.addState(state)
+        if not goal.hasStates():
+            return None
+        planner = geometric.RRTConnect(information)
+    planner.setRange(length)
+    setup.setGoal(goal)
+    setup.setPlanner(planner)
+    setup.solve(base.PlannerTerminationCondition(lambda: bool(removal.checks >= max_checks or removal.spent())))
+    if not setup.haveExactSolutionPath():
+        return None
+    return [pose(state) for state in setup.getSolutionPath().getStates()]
+
+
+def _rotation(x: float, y: float, z: float, w: float) -> list[list[float]]:
+    """The rotation matrix of a unit quaternion; scipy's takes longer than the collision check that follows."""
+    return [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+
+
+def _shortened(removal: Removal, poses: list[Array], rng: np.random.Generator) -> list[Array]:
+    """Fewer poses: each shortcut is confirmed without gaps, which OMPL's own do not do."""
+    for _ in range(SHORTCUTS):
+        if len(poses) < 3 or removal.spent():
+            break
+        i, j = sorted(int(k) for k in rng.choice(len(poses), 2, replace=False))
+        if j - i > 1 and removal.is_clear(Motion(poses[i], poses[j], removal.centre)):
+            poses = [*poses[: i + 1], *poses[j:]]
+    return poses
+
+
+def ompl_works() -> str:
+    """Plan a way round a wall in the plane with OMPL; returns one line about it, raises where it fails."""
+    from ompl import base, geometric, util
+
+    # OMPL logs to stdout, which belongs to the program that calls us.
+    util.setLogLevel(util.LogLevel.LOG_NONE)
+    space = base.RealVectorStateSpace(2)
+    bounds = base.RealVectorBounds(2)
+    bounds.setLow(0.0)
+    bounds.setHigh(1.0)
+    space.setBounds(bounds)
+    setup = geometric.SimpleSetup(space)
+
+    def free(state: base.State) -> bool:
+        # A wall at x = 0.5 with a gap above y = 0.7.
+        return bool(abs(state[0] - 0.5) > 0.05 or state[1] > 0.7)
+
+    setup.setStateValidityChecker(free)
+    start, goal = space.allocState(), space.allocState()
+    start[0], start[1], goal[0], goal[1] = 0.1, 0.1, 0.9, 0.1
+    setup.setStartAndGoalStates(start, goal)
+    setup.setPlanner(geometric.RRTConnect(setup.getSpaceInformation()))
+    if not setup.solve(5.0):
+        raise RuntimeError("RRTConnect found no way round a wall in the plane within 5 s")
+    states = setup.getSolutionPath().getStates()
+    if not all(free(state) for state in states):
+        raise RuntimeError("RRTConnect answered with a path through the wall")
+    return f"RRTConnect went round a wall in the plane in {len(states)} states"

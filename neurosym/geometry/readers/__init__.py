@@ -1,0 +1,1 @@
+"""From a folder or a file to an assembly: a reader for each format, and the checks of what was read."""

@@ -1,0 +1,248 @@
+"""What is wrong with a mesh, by how much, and what to do: harmless faults are mended, the others reported.
+
+Merging vertices, dropping faces of no area and turning faces outward change no solid, so they are done and noted.
+Holes, crossings and missing numbers are the user's to mend: nobody can know what was meant.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from neurosym.geometry.mesh import topology, triangles
+from neurosym.geometry.notes import Note
+from neurosym.geometry.readers.contents import MAX_FACES, RawMesh
+from neurosym.geometry.tolerances import DEFAULT_TOLERANCES
+
+Array = NDArray[np.float64]
+Faces = NDArray[np.int64]
+
+#: Extents of a part lie between these, in the file's unit: beyond, squares and cubes of lengths lose all digits.
+SMALLEST, LARGEST = 1e-9, 1e9
+
+#: Corners nearer than this share of the part are one: text has some eight digits, a 32-bit number seven.
+MERGE = 1e-6
+
+#: A part thinner than this share of its extent (2 volumes over its surface) encloses nothing.
+FLAT = 1e-9
+
+#: Faces that cross by less than this share of the part's smallest extent do no harm: touch is ten times as much.
+CROSSING = 1e-4
+
+#: Pairs of faces looked at for crossings; a mesh with more is noted as not looked through.
+MAX_PAIRS = 10_000_000
+
+#: Shells of one part whose order inside one another is looked at.
+MAX_SHELLS = 64
+
+#: What to do about solids that overlap within a part.
+UNITE = "Unite them (trimesh.boolean.union) for the right mass."
+
+#: Corners that do not turn (cosine) between two faces folded onto one another.
+_FOLDED = -1 + 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Examined:
+    """A mesh as it can be used, unless there are faults.
+
+    Attributes:
+        vertices: float64 (n, 3), merged.
+        faces: int64 (m, 3), outward, none of them a line or a point.
+        notes: harmless findings.
+        faults: findings with which the part cannot be used.
+    """
+
+    vertices: Array
+    faces: Faces
+    notes: tuple[Note, ...]
+    faults: tuple[Note, ...]
+
+
+class _Findings:
+    """Notes and faults of one part, gathered while it is looked at."""
+
+    def __init__(self, part: str) -> None:
+        self.part = part
+        self.notes: list[Note] = []
+        self.faults: list[Note] = []
+
+    def note(self, kind: str, measure: float, sentence: str, remedy: str = "") -> None:
+        self.notes.append(Note(self.part, kind, float(measure), f"Part {self.part!r} {sentence}.", remedy))
+
+    def fault(self, kind: str, measure: float, sentence: str, remedy: str) -> None:
+        self.faults.append(Note(self.part, kind, float(measure), f"Part {self.part!r} {sentence}.", remedy))
+
+
+def examine(mesh: RawMesh) -> Examined:
+    """Look a mesh over, mend what can be mended without changing the solid, and say what cannot.
+
+    Args:
+        mesh: as read; its name is the part's.
+    """
+    found = _Findings(mesh.name)
+    vertices, faces = np.asarray(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces, dtype=np.int64)
+    if _can_be_measured(vertices, faces, mesh.rounding, found):
+        vertices, faces = _closed(vertices, faces, found)
+        if not found.faults:
+            faces = _outward(vertices, faces, found)
+        if not found.faults:
+            _look_for_crossings(vertices, faces, found)
+    return Examined(vertices, faces, tuple(found.notes), tuple(found.faults))
+
+
+def _can_be_measured(vertices: Array, faces: Faces, rounding: float, found: _Findings) -> bool:
+    if not len(vertices) or not len(faces):
+        found.fault("empty", 0, "is empty: it has no faces", "Take the file away, or export the part again.")
+        return False
+    if len(faces) > MAX_FACES:
+        found.fault("empty", len(faces), f"has {len(faces):,} faces, more than {MAX_FACES:,}", "Simplify the mesh.")
+        return False
+    if faces.min() < 0 or faces.max() >= len(vertices):
+        found.fault(
+            "index", faces.max(), f"has faces that index more than its {len(vertices)} vertices", "Export it again."
+        )
+        return False
+    corners = vertices[np.unique(faces)]
+    bad = int((~np.isfinite(corners)).any(axis=1).sum())
+    if bad:
+        found.fault("nan", bad, f"has {bad} vertices that are NaN or infinite", "Export the part again.")
+        return False
+    with np.errstate(over="ignore"):
+        extents = np.ptp(corners, axis=0)
+    if not SMALLEST <= extents.max() <= LARGEST:
+        said = f"is {extents.max():g} long, expected {SMALLEST:g} to {LARGEST:g}"
+        found.fault("flat" if extents.max() < SMALLEST else "far", extents.max(), said, "Use another unit of length.")
+        return False
+    away = float(np.abs(corners).max())
+    step = 2 * away * rounding
+    thin = float(extents[extents > SMALLEST].min())
+    if step > DEFAULT_TOLERANCES.touch * thin / 4:
+        said = f"lies {away:g} from the origin, where coordinates come in steps of {step:.2g}; it is {thin:g} thin"
+        found.fault("far", away, said, "Move the assembly to the origin before exporting it.")
+        return False
+    return True
+
+
+def _closed(vertices: Array, faces: Faces, found: _Findings) -> tuple[Array, Faces]:
+    """The mesh with its vertices merged, its faces of no area dropped, wound one way; faults where it is open."""
+    given = len(faces)
+    extent = float(np.ptp(vertices[np.unique(faces)], axis=0).max())
+    vertices, faces = topology.merged(vertices, faces)
+    faces = topology.without_repeats(faces)
+    half, winding = topology.open_edges(faces) if len(faces) else (np.zeros((0, 2)), False)
+    if len(half):
+        nearer, fewer = topology.merged(vertices, faces, MERGE * extent)
+        fewer = topology.without_repeats(fewer)
+        again, winding_again = topology.open_edges(fewer) if len(fewer) else (half, False)
+        if len(again) < len(half):
+            found.note("merged", len(vertices) - len(nearer), f"has corners up to {MERGE * extent:.2g} apart made one")
+            vertices, faces, half, winding = nearer, fewer, again, winding_again
+    if not len(faces):
+        found.fault("flat", 0, "encloses nothing: its faces cancel or are lines", "Give it a thickness.")
+        return vertices, faces
+    if len(faces) < given:
+        dropped = given - len(faces)
+        found.note("degenerate", dropped, f"had {dropped} faces of no area or given twice, which were dropped")
+    if winding:
+        turned = topology.same_winding(faces)
+        if turned is None:
+            found.fault("open", len(half), "is one-sided, like a Moebius strip", "Export the part as a solid.")
+            return vertices, faces
+        changed = int((turned != faces).any(axis=1).sum())
+        found.note("winding", min(changed, len(faces) - changed), "had faces wound both ways, which were turned")
+        faces = turned
+        half, _ = topology.open_edges(faces)
+    if len(half):
+        if topology.closes_at_junctions(vertices, faces, MERGE * extent):
+            said = f"has {len(half)} edges that meet others halfway; it is closed all the same"
+            found.note("t-junction", len(half), said)
+        else:
+            said = f"is open: {len(half)} edges have a face on one side only"
+            found.fault("open", len(half), said, "Fill the holes (trimesh.repair.fill_holes), or export it as a solid.")
+    return vertices, faces
+
+
+def _outward(vertices: Array, faces: Faces, found: _Findings) -> Faces:
+    """The faces turned so that each shell is a solid, or a cavity in one."""
+    shells = topology.shells_of(faces)
+    volumes = topology.shell_volumes(vertices, faces, shells)
+    area = float(np.linalg.norm(topology.area_vectors(vertices, faces), axis=1).sum())
+    extent = float(np.ptp(vertices, axis=0).max())
+    total = float(volumes.sum())
+    if 2 * np.abs(volumes).sum() <= FLAT * extent * area or abs(total) <= FLAT * extent * area / 2:
+        remedy = "Give it a thickness, or wind its faces one way."
+        found.fault("flat", total, f"encloses no volume ({total:.2g})", remedy)
+        return faces
+    turned = np.zeros(len(volumes), dtype=bool)
+    if total < 0:
+        turned[:] = True
+    if 1 < len(volumes) <= MAX_SHELLS:
+        for k, volume in enumerate(np.where(turned, -volumes, volumes)):
+            around, point = vertices[faces[shells != k]], vertices[faces[shells == k][:1]].mean(axis=1)
+            inside = bool(triangles.are_inside(point, around[:, ::-1] if total < 0 else around)[0])
+            turned[k] ^= volume < 0 and not inside
+    if turned.any():
+        faces = faces.copy()
+        which = turned[shells]
+        faces[which] = faces[which][:, ::-1]
+        found.note("inverted", total, f"was inside out (volume {total:.4g}); its faces were turned")
+    return faces
+
+
+def _look_for_crossings(vertices: Array, faces: Faces, found: _Findings) -> None:
+    margin = CROSSING * float(np.ptp(vertices, axis=0).min())
+    folds = _folds(vertices, faces, margin)
+    if folds:
+        said = f"crosses itself: {folds} pairs of neighbouring faces are folded onto one another"
+        found.fault("self-intersecting", folds, said, "Cut its polygons into triangles before exporting it.")
+        return
+    t = vertices[faces]
+    if triangles.are_convex(vertices, t, margin):
+        return
+    pairs = triangles.crossing_pairs(t, margin, MAX_PAIRS)
+    if pairs is None:
+        found.note("unchecked", len(faces), f"has {len(faces):,} faces, too many to look for crossings among them")
+        return
+    shells = topology.shells_of(faces)
+    if not len(pairs):
+        _look_for_nested(vertices, faces, shells, found)
+        return
+    i, j = pairs.T
+    within = shells[i] == shells[j]
+    which = within if within.any() else ~within
+    count = int(which.sum())
+    where = t[i[which][0]].mean(axis=0)
+    at = f"{count} pairs of faces, one near ({', '.join(f'{x:.4g}' for x in where)})"
+    if within.any():
+        found.fault(
+            "self-intersecting", count, f"crosses itself: {at}", "Mend it (a boolean union of it with nothing does)."
+        )
+    else:
+        said = f"is made of solids that overlap: {at}; its volume counts the overlap twice"
+        found.note("self-intersecting", count, said, UNITE)
+
+
+def _look_for_nested(vertices: Array, faces: Faces, shells: NDArray[np.int64], found: _Findings) -> None:
+    volumes = topology.shell_volumes(vertices, faces, shells)
+    if not 1 < len(volumes) <= MAX_SHELLS:
+        return
+    for k in np.flatnonzero(volumes > 0):
+        if triangles.are_inside(vertices[faces[shells == k][:1]].mean(axis=1), vertices[faces[shells != k]])[0]:
+            said = f"is made of solids inside one another; its volume counts {volumes[k]:.4g} twice"
+            found.note("self-intersecting", volumes[k], said, UNITE)
+
+
+def _folds(vertices: Array, faces: Faces, margin: float) -> int:
+    """How many pairs of neighbouring faces lie on one another: what is left of a hollow polygon cut as a fan."""
+    pairs, _ = topology.neighbours(faces)
+    vectors = topology.area_vectors(vertices, faces)
+    area = np.linalg.norm(vectors, axis=1)
+    t = vertices[faces]
+    longest = np.linalg.norm(t - np.roll(t, 1, axis=1), axis=2).max(axis=1)
+    wide = 2 * area > 10 * margin * np.maximum(longest, 1e-300)
+    pairs = pairs[wide[pairs].all(axis=1)]
+    cosine = np.einsum("nd,nd->n", vectors[pairs[:, 0]], vectors[pairs[:, 1]]) / area[pairs].prod(axis=1)
+    return int((cosine < _FOLDED).sum())

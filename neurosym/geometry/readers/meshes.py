@@ -1,0 +1,214 @@
+"""Meshes as parts: checked, and turned into boxes where they are unions of cubes of one grid."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from neurosym.errors import AssemblyError
+from neurosym.geometry.assembly import Body, Box, Convex, Mesh, Part
+from neurosym.geometry.mesh.triangles import are_convex
+from neurosym.geometry.tolerances import Tolerances
+
+Array = NDArray[np.float64]
+Triangles = tuple[Array, NDArray[np.int64]]
+
+#: A grid finer than this many cells a part is kept as a mesh: boxes would be slower than triangles.
+MAX_CELLS = 4_000
+
+#: Together more cells than this are no puzzle of unit cubes: a cuboid then is one box, any other shape a mesh.
+MAX_UNIT_CUBES = 1_000
+
+#: Where inside a cell (share of its edge) a ray is shot: off the diagonals and edges of the faces it crosses.
+_PROBE = np.array([0.5 + 0.1371, 0.5 + 0.0713, 0.5 + 0.0291])
+
+
+def parts_from_meshes(meshes: Mapping[str, Any], tolerances: Tolerances) -> tuple[Part, ...]:
+    """One part a mesh, all in the world's frame."""
+    triangles = {name: _triangles(name, mesh) for name, mesh in meshes.items()}
+    if not triangles:
+        raise AssemblyError("Expected at least one mesh; got none.")
+    cubes = _common_grid(triangles, tolerances)
+    return tuple(
+        Part(name, cubes[name] if name in cubes else (_one_body(*triangles[name]),), np.eye(4)) for name in triangles
+    )
+
+
+def _triangles(name: str, mesh: Any) -> Triangles:
+    try:
+        vertices, faces = (mesh.vertices, mesh.faces) if hasattr(mesh, "vertices") else mesh
+        v, f = np.array(vertices, dtype=np.float64), np.array(faces, dtype=np.int64)
+    except (TypeError, ValueError) as error:
+        raise AssemblyError(f"Part {name!r}: expected a mesh with vertices and faces; got {mesh!r}: {error}.") from None
+    if v.ndim != 2 or v.shape[1] != 3 or f.ndim != 2 or f.shape[1] != 3 or not len(v) or not len(f):
+        raise AssemblyError(
+            f"Part {name!r}: expected vertices (n, 3) and faces (m, 3), not empty; got {v.shape} and {f.shape}."
+        )
+    if f.min() < 0 or f.max() >= len(v):
+        raise AssemblyError(
+            f"Part {name!r}: expected faces that index its {len(v)} vertices; got {f.min()} to {f.max()}."
+        )
+    if not np.isfinite(v).all():
+        raise AssemblyError(f"Part {name!r}: expected finite coordinates; got NaN or infinity.")
+    volume = signed_volume(v, f)
+    extent = float(np.ptp(v, axis=0).max())
+    edges = v[f[:, [1, 2, 0]]] - v[f]
+    # On a closed surface the area vectors of the faces cancel.
+    area_vectors = np.cross(edges[:, 0], -edges[:, 2]) / 2
+    if np.linalg.norm(area_vectors.sum(axis=0)) > 1e-6 * np.linalg.norm(area_vectors, axis=1).sum():
+        raise AssemblyError(
+            f"Part {name!r}: expected a closed mesh; its faces leave a gap. Fill it (trimesh.repair.fill_holes)."
+        )
+    if abs(volume) <= 1e-12 * extent**3:
+        raise AssemblyError(f"Part {name!r}: expected a mesh that encloses a volume; it encloses none.")
+    return v, f if volume > 0 else f[:, ::-1]
+
+
+def signed_volume(vertices: Array, faces: NDArray[np.int64]) -> float:
+    """Volume enclosed by a closed mesh, positive when its faces point outward (divergence theorem)."""
+    a, b, c = (vertices[faces[:, k]] - vertices[0] for k in range(3))
+    return float(np.einsum("nd,nd->n", a, np.cross(b, c)).sum() / 6)
+
+
+def _one_body(vertices: Array, faces: NDArray[np.int64]) -> Body:
+    """A single body, its frame at the centre of its bounds, so that numbers stay small."""
+    centre = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
+    X = np.eye(4)
+    X[:3, 3] = centre
+    local = vertices - centre
+    convex = are_convex(local, local[faces], 1e-9 * float(np.ptp(local)))
+    return Body((Convex if convex else Mesh)(local, faces), X)
+
+
+def _common_grid(meshes: Mapping[str, Triangles], tolerances: Tolerances) -> dict[str, tuple[Body, ...]]:
+    """Boxes for the parts that are unions of cubes of one common grid; the others are left out."""
+    # Far from the origin a frame's rounding would grow into shifts: all is measured from the middle.
+    middle = np.mean([v.mean(axis=0) for v, _ in meshes.values()], axis=0)
+    near = {name: (v - middle, f) for name, (v, f) in meshes.items()}
+    frames = {name: _orthogonal_frame(v, f, tolerances) for name, (v, f) in near.items()}
+    frame = next((f for f in frames.values() if f is not None), None)
+    if frame is None:
+        return {}
+    fitting = [n for n, own in frames.items() if own is not None and _same_axes(frame, own, tolerances)]
+    frame = _mean_frame(frame, [near[n] for n in fitting])
+    local = {name: (near[name][0] @ frame, near[name][1]) for name in fitting}
+    spans = []
+    for vertices, _ in local.values():
+        for axis in vertices.T:
+            gaps = np.diff(np.sort(axis))
+            spans.append(gaps[gaps > 1e-3 * max(float(np.ptp(axis)), 1e-300)])
+    pitch = _common_divisor(np.concatenate(spans))
+    if pitch is None:
+        return {}
+    found: dict[str, tuple[Body, ...]] = {}
+    origin = local[fitting[0]][0].min(axis=0)
+    cells = {name: _cells(vertices, faces, pitch) for name, (vertices, faces) in local.items()}
+    many = sum(len(c) for c in cells.values() if c is not None) > MAX_UNIT_CUBES
+    for name, own_cells in cells.items():
+        if own_cells is None:
+            continue
+        low = local[name][0].min(axis=0)
+        steps = (low - origin) / pitch
+        if np.abs(steps - np.round(steps)).max() < 0.01:
+            low = origin + np.round(steps) * pitch
+        counts = own_cells.max(axis=0) + 1
+        if many and len(own_cells) != counts.prod():
+            continue
+        size = counts * pitch if many else np.full(3, pitch)
+        centres = [counts / 2] if many else own_cells + 0.5
+        bodies = []
+        for centre in centres:
+            X = np.eye(4)
+            X[:3, :3] = frame
+            X[:3, 3] = middle + frame @ (low + centre * pitch)
+            bodies.append(Body(Box(np.asarray(size, dtype=np.float64)), X))
+        found[name] = tuple(bodies)
+    return found
+
+
+def _mean_frame(frame: Array, meshes: list[Triangles]) -> Array:
+    """The rotation (3, 3) nearest to all faces of all meshes, each weighed by its area."""
+    triangles = np.concatenate([v[f] for v, f in meshes])
+    area = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    along = area @ frame
+    axis = np.abs(along).argmax(axis=1)
+    columns = [(np.sign(along[axis == k, k])[:, None] * area[axis == k]).sum(axis=0) for k in range(3)]
+    u, _, vt = np.linalg.svd(np.stack([c / np.linalg.norm(c) for c in columns], axis=1))
+    nearest: Array = u @ vt
+    return nearest
+
+
+def _orthogonal_frame(vertices: Array, faces: NDArray[np.int64], tolerances: Tolerances) -> Array | None:
+    """Rotation (3, 3) whose columns are the directions of all faces, or None when they are not three such."""
+    t = vertices[faces]
+    normals = np.cross(t[:, 1] - t[:, 0], t[:, 2] - t[:, 0])
+    lengths = np.linalg.norm(normals, axis=1)
+    normals = normals[lengths > 1e-9 * lengths.max()]
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    axes: list[Array] = []
+    left = normals
+    while len(left) and len(axes) < 3:
+        axes.append(left[0])
+        left = left[np.linalg.norm(np.cross(left, left[0]), axis=1) > 10 * tolerances.parallel]
+    if len(left) or len(axes) != 3:
+        return None
+    frame = np.stack(axes, axis=1)
+    if not np.allclose(frame.T @ frame, np.eye(3), atol=10 * tolerances.parallel):
+        return None
+    frame[:, 2] = np.cross(frame[:, 0], frame[:, 1])
+    return frame
+
+
+def _same_axes(a: Array, b: Array, tolerances: Tolerances) -> bool:
+    return bool(np.allclose(np.sort(np.abs(a.T @ b).ravel()), [0] * 6 + [1] * 3, atol=10 * tolerances.parallel))
+
+
+def _common_divisor(gaps: Array) -> float | None:
+    """The largest length of which all gaps are whole multiples (within 1%), or None."""
+    smallest = float(gaps.min())
+    for parts in (1, 2, 3):
+        pitch = smallest / parts
+        ratio = gaps / pitch
+        if np.abs(ratio - np.round(ratio)).max() < 0.01:
+            return float(gaps.sum() / np.round(ratio).sum())
+    return None
+
+
+def _cells(local: Array, faces: NDArray[np.int64], pitch: float) -> NDArray[np.int64] | None:
+    """The cells, int64 (n, 3) from 0, that a mesh in the grid's frame is the union of; None when it is not."""
+    low = local.min(axis=0)
+    counts = np.round(np.ptp(local, axis=0) / pitch).astype(int)
+    if counts.min() < 1 or counts.prod() > MAX_CELLS:
+        return None
+    offsets = (local - low) / pitch
+    if np.abs(offsets - np.round(offsets)).max() > 0.01:
+        return None
+    t = np.round(offsets)[faces]
+    e1, e2 = t[:, 1] - t[:, 0], t[:, 2] - t[:, 0]
+    area = e1[:, 0] * e2[:, 1] - e1[:, 1] * e2[:, 0]  # twice the signed shadow on the floor
+    lids = t[area != 0]
+    sign = np.sign(area[area != 0])
+    columns = np.stack(np.meshgrid(*map(np.arange, counts[:2]), indexing="ij"), axis=-1).reshape(-1, 2)
+    inside = _in_triangles(columns + _PROBE[:2], lids[..., :2])  # (columns, lids)
+    levels = np.arange(counts[2]) + _PROBE[2]
+    above = lids[None, :, 0, 2] > levels[:, None]  # (levels, lids)
+    winding = np.einsum("cl,zl,l->cz", inside.astype(float), above.astype(float), sign)
+    c, z = np.nonzero(np.round(winding) > 0)
+    if abs(len(c) - signed_volume(t.reshape(-1, 3), np.arange(3 * len(t)).reshape(-1, 3))) > 1e-6:
+        return None
+    return np.concatenate([columns[c], z[:, None]], axis=1)
+
+
+def _in_triangles(points: Array, triangles: Array) -> NDArray[np.bool_]:
+    """bool (n, m): which points (n, 2) lie in which triangles (m, 3, 2)."""
+    sides = []
+    for k in range(3):
+        a, b = triangles[:, k], triangles[:, (k + 1) % 3]
+        d = points[:, None] - a[None]
+        e = b - a
+        sides.append(e[None, :, 0] * d[..., 1] - e[None, :, 1] * d[..., 0])
+    stacked = np.stack(sides)
+    return np.asarray((stacked > 0).all(axis=0) | (stacked < 0).all(axis=0))

@@ -1,0 +1,47 @@
+"""Which parts to hold so that a subset stands: a search for a set that hits every motion in which it falls."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from neurosym.support.bitsets import bits
+
+if TYPE_CHECKING:
+    from neurosym.geometry.stability.standing import Standing
+
+
+def parts_to_hold(standing: Callable[[int], Standing], hands: int, most: int) -> tuple[int | None, list[int]]:
+    """What to hold, `most` parts at the most, so that a subset stands.
+
+    Holding helps only against a motion in which the held part moves. So where a subset falls, one of the parts that
+    move is held, and the question is asked again.
+
+    Args:
+        standing: whether the subset stands when the parts in a bitset are held.
+        hands: bitset of the parts that can be held.
+
+    Returns:
+        A bitset of parts, None if nothing helps; and the motions that were met, each a bitset of the parts that move.
+    """
+    motions: list[int] = []
+
+    def search(held: int, left: int, barred: int) -> int | None:
+        while True:
+            missed = [m & hands & ~barred for m in motions if not m & held]
+            if not missed:
+                answer = standing(held)
+                if answer.stands:
+                    return held
+                motions.append(answer.moving)
+                continue
+            if not left:
+                return None
+            for part in bits(min(missed, key=int.bit_count)):
+                found = search(held | 1 << part, left - 1, barred)
+                if found is not None:
+                    return found
+                barred |= 1 << part
+            return None
+
+    return search(0, most, 0), motions

@@ -1,0 +1,74 @@
+"""What the question of standing is made of: contact patches between parts, masses and centres of mass."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from neurosym.geometry.assembly import Box
+from neurosym.geometry.contact.contacts import TABLE, Contact, hull_points
+from neurosym.geometry.readers.meshes import signed_volume
+
+if TYPE_CHECKING:
+    from neurosym.geometry.assembly import Assembly
+
+Array = NDArray[np.float64]
+
+
+def patch_axes(patch: Contact) -> tuple[Array, Array]:
+    """Tangents (3,) of a patch along and across its longest edge: the cone turns with the parts, not with the world."""
+    following = np.roll(patch.points, -1, axis=0) - patch.points
+    u = following[np.argmax(np.linalg.norm(following, axis=1))]
+    u = u - (u @ patch.normal) * patch.normal
+    u = u / np.linalg.norm(u)
+    return u, np.cross(patch.normal, u)
+
+
+def merged_patches(assembly: Assembly, contacts: tuple[Contact, ...]) -> tuple[Contact, ...]:
+    """Contacts between parts, those in one plane merged into the convex hull of their corners; a, b are parts.
+
+    For rigid parts nothing is lost: a force anywhere in the hull with a cone's direction is a sum of such
+    forces at its corners.
+    """
+    owners, touch = assembly.owners, assembly.touch
+    groups: dict[tuple[int, int], list[tuple[Array, float, list[Array], float]]] = {}
+    for c in contacts:
+        a, b = int(owners[c.a]), TABLE if c.b == TABLE else int(owners[c.b])
+        normal = c.normal
+        if b != TABLE and a > b:
+            a, b, normal = b, a, -normal
+        offset = float(c.points.mean(axis=0) @ normal)
+        planes = groups.setdefault((a, b), [])
+        for k, (known, distance, points, area) in enumerate(planes):
+            if known @ normal > 1 - 1e-6 and abs(distance - offset) <= 2 * touch:
+                planes[k] = (known, distance, [*points, c.points], area + c.area)
+                break
+        else:
+            planes.append((normal, offset, [c.points], c.area))
+    found = []
+    for (a, b), planes in groups.items():
+        for normal, _, points, area in planes:
+            corners = points[0] if len(points) == 1 else hull_points(np.concatenate(points), normal)
+            found.append(Contact(a, b, corners, normal, area))
+    return tuple(found)
+
+
+def masses(assembly: Assembly) -> tuple[Array, Array]:
+    """Masses (n,) and centres of mass (n, 3), in the world, of the parts."""
+    volumes, moments = np.zeros(len(assembly)), np.zeros((len(assembly), 3))
+    for i, body in enumerate(assembly.bodies):
+        owner = assembly.owners[i]
+        if isinstance(body.shape, Box):
+            volume, centre = float(np.prod(body.shape.size)), assembly.X_WB[i][:3, 3]
+        else:
+            vertices, faces = assembly.body_vertices(i), body.shape.faces
+            volume = signed_volume(vertices, faces)
+            a, b, c = (vertices[faces[:, k]] - vertices[0] for k in range(3))
+            each = np.einsum("nd,nd->n", a, np.cross(b, c)) / 6
+            centre = vertices[0] + (each[:, None] * (a + b + c)).sum(axis=0) / (4 * volume)
+        volumes[owner] += volume
+        moments[owner] += volume * centre
+    densities = np.array([p.density for p in assembly.parts])
+    return volumes * densities, moments / volumes[:, None]

@@ -1,0 +1,198 @@
+"""Ready-made geometric predicates for domains whose world is an `Assembly`.
+
+Each is made from the fluent that says which parts are there:
+
+    free, stable_without = ns.predicates.free(present), ns.predicates.stable_without(present)
+
+and answers with evidence: which parts block, in which directions; which parts fall and what they lose. What a
+verdict promises (`until`) follows from removal tasks: parts that left do not come back. A domain in which
+parts also return must pass ``removal=False``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+from numpy.typing import ArrayLike
+
+from neurosym.errors import DefinitionError
+from neurosym.geometry.assembly import Assembly
+from neurosym.geometry.blocking.sweep import exits_along
+from neurosym.geometry.step_motion import Way
+from neurosym.language import formulas
+from neurosym.language.search_problem import Verdict
+from neurosym.language.state import State
+from neurosym.language.terms import Atom, Derived, Fluent, Literal, Type
+from neurosym.planning.explanation import listed
+from neurosym.support.bitsets import bits
+
+
+def free(
+    present: Fluent, *, directions: ArrayLike | None = None, table: bool = True, removal: bool = True
+) -> Derived:
+    """``free(p)``: part p can leave by one straight translation, past the parts present and the table.
+
+    Args:
+        present: the fluent, of one part, that says which parts are there.
+        directions: float64 (k, 3), tried in order; default the axes the assembly is built along, up first.
+        table: whether the table is in the way of what moves down.
+        removal: parts that left do not come back, so that a verdict may promise.
+    """
+    part = _part_type(present)
+
+    def ask(world: Assembly, state: State, p: str) -> Verdict:
+        graph = world.blocking(directions)
+        names = world.names
+        number = world.index[p]
+        there = state.mask(present, names) & ~(1 << number)
+        into_table = graph.into_table
+        witnesses, because = 0, 0
+        for d in range(len(graph.directions)):
+            if table and into_table[d]:
+                continue
+            if world.keeps_answers:
+                hit = graph.by_part[d][number] & there
+            else:
+                hit = sum(1 << o for o in exits_along(world, number, graph.directions[d], bits(there)))
+            if not hit:
+                return Verdict(True, (), f"{p} is free along {graph.describe(d)}.", None, graph.vectors[d])
+            because |= hit
+            # One blocker a direction keeps the promise; one that blocks several keeps it for all of them.
+            if not witnesses & hit:
+                witnesses |= hit & -hit
+        said = "; ".join(
+            f"{graph.describe(d)}: "
+            + ("the table" if table and into_table[d] else ", ".join(world.in_mask(graph.by_part[d][number] & there)))
+            for d in range(len(graph.directions))
+        )
+        until = tuple(Atom(present, (n,)) for n in world.in_mask(witnesses)) if removal else None
+        said = f"{p} is blocked in every direction ({said})."
+        return Verdict(False, world.in_mask(because), said, until, unconditional=True)
+
+    def formula(world: Assembly, p: str) -> formulas.AnyOf:
+        graph = world.blocking(directions)
+        ways = []
+        for d in range(len(graph.directions)):
+            if not (table and graph.into_table[d]):
+                blockers = world.in_mask(graph.by_part[d][world.index[p]])
+                ways.append(formulas.Way(f"along {graph.describe(d)}", tuple(~present(n) for n in blockers)))
+        return formulas.AnyOf(tuple(ways))
+
+    return Derived("free", [part], ask, formula=formula)
+
+
+def interlocked(present: Fluent, *, directions: ArrayLike | None = None, table: bool = True) -> Derived:
+    """``interlocked()``: no single part of those present is free (they may still come apart in groups)."""
+    one = free(present, directions=directions, table=table).function
+
+    def ask(world: Assembly, state: State) -> Verdict:
+        there = state.objects(present)
+        for p in there:
+            verdict = one(world, state, p)
+            if verdict.holds:
+                return Verdict(False, (p,), verdict.reason)
+        return Verdict(bool(there), there, f"No single part of {', '.join(there) or 'none'} is free.")
+
+    return Derived("interlocked", [], ask)
+
+
+def supported(present: Fluent, *, removal: bool = True) -> Derived:
+    """``supported(p)``: something under part p, a part present or the table, touches it from below."""
+    part = _part_type(present)
+
+    def ask(world: Assembly, state: State, p: str) -> Verdict:
+        stability = world.stability()
+        number = world.index[p]
+        carriers = world.in_mask(stability.supports[number] & state.mask(present, world.names))
+        if stability.on_table >> number & 1:
+            carriers = (*carriers, "the table")
+        if carriers:
+            return Verdict(True, carriers, f"{p} stands on {', '.join(carriers)}.")
+        lost = world.in_mask(stability.supports[number])
+        return Verdict(False, lost, f"{p} has lost {', '.join(lost) or 'nothing'} under it.", () if removal else None)
+
+    def formula(world: Assembly, p: str) -> formulas.AnyOf:
+        stability = world.stability()
+        number = world.index[p]
+        if stability.on_table >> number & 1:
+            return formulas.AnyOf((formulas.Way("on the table", ()),))
+        carriers = world.in_mask(stability.supports[number])
+        return formulas.AnyOf(tuple(formulas.Way(f"on {n}", (Literal(present(n)),)) for n in carriers))
+
+    return Derived("supported", [part], ask, formula=formula)
+
+
+def stable_without(present: Fluent, *, removal: bool = True, held: int = 0) -> Derived:
+    """``stable_without(p)``: the parts present other than p stand still under gravity, friction included.
+
+    Args:
+        present: the fluent, of one part, that says which parts are there.
+        removal: parts that left do not come back, so that a verdict may promise.
+        held: how many of the others may be held meanwhile; with any, `how` is a `Way` that says which, and nothing is
+            promised.
+    """
+    part = _part_type(present)
+
+    def ask(world: Assembly, state: State, p: str) -> Verdict:
+        rest = state.mask(present, world.names) & ~(1 << world.index[p])
+        return stands(world, rest, (p,), present if removal and not held else None, held)
+
+    def check(world: Assembly, state: State, how: Any, p: str) -> Verdict:
+        hands = how.held if isinstance(how, Way) else ()
+        if len(hands) > held or p in hands:
+            return Verdict(False, hands, f"Step {p}: expected at most {held} of the others to be held; got {hands}.")
+        rest = state.mask(present, world.names) & ~(1 << world.index[p])
+        if world.stability().standing(rest, held=world.mask(hands)).stands:
+            return Verdict(True, (), f"The others stand without {p}.", how=how)
+        return ask(world, state, p) if not hands else _falls(world, world.stability().standing(rest).moving, (p,), held)
+
+    def formula(world: Assembly, p: str) -> formulas.Stands:
+        return formulas.Stands(present, p, held)
+
+    return Derived("stable_without", [part], ask, check=check, formula=formula)
+
+
+def stands(world: Assembly, rest: int, leaving: Sequence[str], present: Fluent | None = None, held: int = 0) -> Verdict:
+    """Whether the parts in the bitset `rest` stand once those in `leaving` are gone.
+
+    Args:
+        present: the fluent that says which parts are there, for a verdict that promises; None promises nothing.
+        held: how many may be held.
+    """
+    said = ", ".join(leaving)
+    answer = world.stability().standing_when_held(rest, held) if held else world.stability().standing(rest)
+    if answer.stands:
+        how = Way(held=world.in_mask(answer.held)) if answer.held else None
+        return Verdict(True, (), f"The others stand without {said}.", how=how)
+    verdict = _falls(world, answer.moving, leaving, held)
+    # The motion stays possible while every part that moves in it is there, whatever else has left.
+    until = None if present is None else tuple(Atom(present, (n,)) for n in verdict.because)
+    return replace(verdict, until=until)
+
+
+def _falls(world: Assembly, moving: int, leaving: Sequence[str], held: int) -> Verdict:
+    falling = world.in_mask(moving)
+    lost = losses(world, moving, world.mask(leaving))
+    said = f"Without {listed(leaving)}, {listed(falling)} would fall"
+    if held:
+        said += f", whichever {'part' if held == 1 else f'{held} parts'} one holds"
+    if lost:
+        said += f" ({listed([f'{a} loses {b}' for a, b in lost])})"
+    return Verdict(False, falling, f"{said}.")
+
+
+def losses(world: Assembly, falling: int, leaving: int) -> tuple[tuple[str, str], ...]:
+    """Pairs of names (a, b): a is one of `falling` and touches b, one of `leaving` (bitsets of parts)."""
+    touching = world.stability().touching
+    return tuple((world.names[a], b) for a in bits(falling) for b in world.in_mask(touching[a] & leaving))
+
+
+def _part_type(present: Fluent) -> Type:
+    if not isinstance(present, Fluent) or len(present.types) != 1:
+        raise DefinitionError(
+            f"Expected the fluent of one part that says which parts are there; got {present!r}. "
+            'For instance present = ns.Fluent("present", part).'
+        )
+    return present.types[0]

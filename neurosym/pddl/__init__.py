@@ -1,0 +1,1 @@
+"""PDDL: a problem written for any classical planner, with what geometry found as facts."""

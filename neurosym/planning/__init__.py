@@ -1,0 +1,1 @@
+"""What a planner is given and gives back: budgets, priors, results, validation, explanations, plan files."""

@@ -1,0 +1,198 @@
+"""Why there is no plan, as data and in sentences: who blocks whom, which parts interlock, what would fall.
+
+`explain` looks at one set of parts at which a search got stuck: nothing of it could be taken out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from neurosym.geometry.blocking.directions import in_words
+from neurosym.geometry.blocking.graph import BlockingGraph
+from neurosym.geometry.step_motion import GROUND as GROUND
+from neurosym.geometry.step_motion import Vector
+from neurosym.support.bitsets import bits
+from neurosym.support.words import joined
+
+#: Names, or sentences of one kind, beyond this many are counted, not listed; the data has them all.
+LISTED = 8
+
+
+@dataclass(frozen=True)
+class Blocked:
+    """A part that cannot go along a direction, and the parts (or the ground) that it would hit."""
+
+    part: str
+    direction: Vector
+    by: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """Parts each of which would hit the next one, and the last one the first, along a direction."""
+
+    direction: Vector
+    parts: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Fall:
+    """Parts that would fall if others left.
+
+    Attributes:
+        without: names of the parts that would leave.
+        parts: names of those that would fall.
+        lost: pairs (a, b): a falls, and touched b, which would leave.
+        held: how many parts may be held, which does not help.
+    """
+
+    without: tuple[str, ...]
+    parts: tuple[str, ...]
+    lost: tuple[tuple[str, str], ...]
+    held: int = 0
+
+
+@dataclass(frozen=True)
+class WhyNot:
+    """Why nothing can be taken out.
+
+    Attributes:
+        after: names of the actions after which the search got stuck: the longest prefix that works.
+        left: names of the parts that are there still, those among them that never leave included.
+        blocked: for every part that is blocked in each direction, one entry a direction.
+        cycle: the smallest cycle of parts that block one another along one direction; None where there is none,
+            because all that is blocked is blocked by what never leaves.
+        falls: for parts that could leave, what would fall.
+        waiting: pairs (a, b): a could go, but only after b.
+        unproved: names of parts for which a search for a way ended without a proof that there is none.
+        relaxed: whether gravity and precedence were left aside: even so there is no plan. `after` then need not work.
+    """
+
+    after: tuple[str, ...]
+    left: tuple[str, ...]
+    blocked: tuple[Blocked, ...] = ()
+    cycle: Cycle | None = None
+    falls: tuple[Fall, ...] = ()
+    waiting: tuple[tuple[str, str], ...] = ()
+    unproved: tuple[str, ...] = ()
+    relaxed: bool = False
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """The same for a person; what is long is cut, with a count."""
+        start = f"After {listed(self.after)} nothing" if self.after else "Nothing"
+        relaxed = ", even if nothing could fall and any order would do" if self.relaxed else ""
+        said = [f"{start} can be taken out of {listed(self.left)}{relaxed}."]
+        if self.cycle is not None:
+            chain = " blocks ".join([self.cycle.parts[0], *self.cycle.parts[:0:-1], self.cycle.parts[0]])
+            said.append(
+                f"The smallest interlocked cycle, along {in_words(self.cycle.direction)}, has "
+                f"{len(self.cycle.parts)} parts: {chain}."
+            )
+        by_part: dict[str, list[Blocked]] = {}
+        for blocked in self.blocked:
+            by_part.setdefault(blocked.part, []).append(blocked)
+        said += _first(
+            [
+                f"{part} is blocked: " + "; ".join(f"{in_words(b.direction)} by {listed(b.by)}" for b in entries) + "."
+                for part, entries in by_part.items()
+            ],
+            "parts are blocked",
+        )
+        said += _first([_fall(f) for f in self.falls], "parts could go, but others would fall")
+        said += _first([f"{a} may leave only after {b}." for a, b in self.waiting], "parts wait for others")
+        if self.unproved:
+            said.append(
+                f"For {listed(self.unproved)} the search for a way ended without one, which proves nothing: "
+                "more directions or a larger budget may find it."
+            )
+        return tuple(said)
+
+    def as_json(self) -> dict[str, Any]:
+        """For a file: the attributes, and `sentences`."""
+        return {**asdict(self), "sentences": list(self.sentences)}
+
+
+def blockers_of(graph: BlockingGraph, part: int, there: int, *, table: bool) -> list[Blocked]:
+    """What stops a part among the parts in the bitset `there`, one entry a direction in which something does."""
+    found = []
+    for d, vector in enumerate(graph.vectors):
+        by = graph.assembly.in_mask(graph.blockers(part, d, there))
+        if table and graph.into_table[d]:
+            by = (*by, GROUND)
+        if by:
+            x, y, z = vector
+            found.append(Blocked(graph.names[part], (x, y, z), by))
+    return found
+
+
+def smallest_cycle(graph: BlockingGraph, there: int) -> Cycle | None:
+    """The shortest cycle of parts in `there` that block one another along one direction, over all directions.
+
+    Along each direction in turn; the first of the shortest. Two that block each other are found by bit arithmetic,
+    longer ones by breadth-first search from each part.
+    """
+    best: tuple[int, ...] = ()
+    direction = 0
+    for d in range(len(graph.vectors)):
+        along = [graph.blockers(i, d, there) if there >> i & 1 else 0 for i in range(len(graph.names))]
+        found = _shortest(along, there, len(best) or len(along) + 1)
+        if found:
+            best, direction = found, d
+        if len(best) == 2:
+            break
+    if not best:
+        return None
+    x, y, z = graph.vectors[direction]
+    return Cycle((x, y, z), tuple(graph.names[i] for i in best))
+
+
+def _shortest(along: Sequence[int], there: int, below: int) -> tuple[int, ...]:
+    """The shortest cycle with fewer than `below` nodes in a graph of bitsets of successors; empty: none."""
+    for i in bits(there):
+        for j in bits(along[i]):
+            if along[j] >> i & 1:
+                return (i, j) if below > 2 else ()
+    best: tuple[int, ...] = ()
+    for start in bits(there):
+        parent = {start: -1}
+        layer, seen, length = [start], 1 << start, 1  # parts on a path from the start to one of this layer
+        while layer and length < below:
+            last = next((i for i in layer if along[i] >> start & 1), -1)
+            if last >= 0:
+                path = []
+                while last >= 0:
+                    path.append(last)
+                    last = parent[last]
+                best, below = tuple(path[::-1]), length
+                break
+            following = []
+            for i in layer:
+                for j in bits(along[i] & ~seen):
+                    seen |= 1 << j
+                    parent[j] = i
+                    following.append(j)
+            layer, length = following, length + 1
+    return best
+
+
+def listed(names: Sequence[str]) -> str:
+    """'a, b and c'; many names are cut short."""
+    if len(names) > LISTED:
+        return f"{', '.join(names[: LISTED - 1])} and {len(names) - LISTED + 1} more"
+    return joined(names)
+
+
+def _fall(fall: Fall) -> str:
+    lost = [f"{a} loses {b}" for a, b in fall.lost]
+    held = "" if not fall.held else f", whichever {'part' if fall.held == 1 else f'{fall.held} parts'} one holds"
+    cause = f" ({'; '.join(lost[:LISTED])}{'; ...' if len(lost) > LISTED else ''})" if lost else ""
+    return f"Without {listed(fall.without)}, {listed(fall.parts)} would fall{held}{cause}."
+
+
+def _first(sentences: list[str], what: str) -> list[str]:
+    if len(sentences) <= LISTED:
+        return sentences
+    return [*sentences[: LISTED - 1], f"{len(sentences) - LISTED + 1} more {what}."]

@@ -1,0 +1,81 @@
+"""A prior that needs no training: what lies outermost leaves first."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from neurosym.errors import InputError
+from neurosym.geometry.assembly import Assembly
+from neurosym.geometry.blocking.directions import Directions
+from neurosym.planning.prior import OrderScores, Prior
+from neurosym.support.bitsets import bits
+
+if TYPE_CHECKING:
+    from neurosym.language.domain import Problem
+
+
+class OutermostFirst(Prior):
+    """Peels an assembly like an onion: first the parts that nothing blocks, then those that only these blocked, ...
+
+    Under gravity a layer has only parts with nothing above them, as long as there are such. Within a layer the topmost
+    comes first, then the farthest from the middle; parts that never come free by themselves are last. Geometry alone,
+    along the problem's directions: no pictures, and no question whether anything falls.
+
+    Args:
+        decay: how many steps away from its place in this order a part is e times less likely (steps).
+    """
+
+    def __init__(self, *, decay: float = 2.0) -> None:
+        if not decay > 0:
+            raise InputError(f"Expected a decay above 0 steps; got {decay}.")
+        self.decay = decay
+
+    def scores(self, problems: Sequence[Problem]) -> list[OrderScores]:
+        """One table a problem, (n_actions, n_actions).
+
+        Raises:
+            InputError: the problem's world is no `Assembly`, or its actions are not named after parts.
+        """
+        return [self._scores(problem) for problem in problems]
+
+    def _scores(self, problem: Problem) -> OrderScores:
+        world = problem.world
+        removes = {} if problem.simulation is None else problem.simulation.removes
+        parts = [removes.get(action, action) for action in problem.actions]
+        strange = [n for n in parts if not isinstance(world, Assembly) or n not in world.index]
+        if strange:
+            raise InputError(
+                "Expected a problem whose world is an Assembly and whose actions are named after its parts, for the "
+                f"prior outermost-first; {problem.name!r} has the action {strange[0]!r}."
+            )
+        details = problem.details
+        order = outermost_order(world, details.get("directions"), gravity=details.get("gravity", True))
+        rank = {name: place for place, name in enumerate(order)}
+        place = np.argsort(np.argsort([rank[n] for n in parts]))
+        steps = np.arange(len(parts))
+        table = -np.abs(steps[:, None] - place[None, :]) / self.decay
+        return OrderScores(table, problem.actions, classes=problem.classes)
+
+
+def outermost_order(assembly: Assembly, directions: Directions = None, *, gravity: bool = True) -> list[str]:
+    """Names of all parts, the outermost first, fixed ones last."""
+    graph, up = assembly.blocking(directions), assembly.blocking("+z")
+    fixed = assembly.fixed_mask
+    left = (1 << len(assembly)) - 1 & ~fixed
+    bounds = [assembly.body_bounds[assembly.owners == i] for i in range(len(assembly))]
+    # In steps of the touching tolerance: heights that differ by rounding are equal.
+    height = [round(float(own[:, 1, 2].max()) / assembly.touch) for own in bounds]
+    middle = assembly.bounds.mean(axis=0)
+    distance = [float(np.linalg.norm(own.mean(axis=(0, 1)) - middle)) for own in bounds]
+    order: list[int] = []
+    while left:
+        free = [i for i in bits(left) if graph.free_directions(i, left | fixed)] or bits(left)
+        topmost = [i for i in free if not up.blockers(i, 0, left | fixed)] if gravity else []
+        layer = topmost or free
+        layer.sort(key=lambda i: (-height[i], -distance[i], i))
+        order += layer
+        left &= ~sum(1 << i for i in layer)
+    return [assembly.names[i] for i in [*order, *bits(fixed)]]

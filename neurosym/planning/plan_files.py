@@ -1,0 +1,115 @@
+"""plan.json: what `neurosym plan --out` writes, read back as a problem and its plan."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from neurosym.errors import InputError
+from neurosym.geometry.readers.reading import referenced
+from neurosym.geometry.step_motion import Way
+from neurosym.registry import load_domain
+
+if TYPE_CHECKING:
+    from neurosym.language.domain import Problem
+
+#: Of the file. Raise it when a reader of the old one would go wrong.
+SCHEMA = 1
+
+
+@dataclass(frozen=True, eq=False)
+class SavedPlan:
+    """A plan from a file.
+
+    Attributes:
+        problem: made again from what the file says of it.
+        plan: names of the actions, in order.
+        how: one entry a step: how it is done, a `Way`, a direction, a path, or None.
+        document: the whole file.
+    """
+
+    problem: Problem
+    plan: tuple[str, ...]
+    how: tuple[Any, ...]
+    document: Mapping[str, Any]
+
+
+def read_plan(path: str | Path) -> SavedPlan:
+    """Read a plan.
+
+    Raises:
+        InputError: no such file, not what `neurosym plan --out` writes, of another schema, or without a plan in it.
+    """
+    document = read_document(Path(path))
+    schema = document.get("schema")
+    if schema != SCHEMA:
+        raise InputError(f"Expected a plan of schema {SCHEMA} in {path}; got {schema!r}. Plan again with this version.")
+    if document.get("plan") is None:
+        raise InputError(
+            f"Expected a plan in {path}; its search found none: {document.get('sentence', 'it does not say why')}"
+        )
+    steps = document.get("steps")
+    if not isinstance(steps, list) or not all(isinstance(s, dict) and isinstance(s.get("action"), str) for s in steps):
+        raise InputError(f'Expected "steps" in {path} as a list of {{"action": name, "how": ...}}; got {steps!r}.')
+    problem = problem_of(document, path)
+    for step in steps:
+        if step["action"] not in problem.actions:
+            raise InputError(
+                f"Expected steps in {path} that are actions of {problem.name!r}; got {step['action']!r}, and there are "
+                f"{', '.join(problem.actions)}."
+            )
+    if document["plan"] != [step["action"] for step in steps]:
+        raise InputError(f'Expected the same actions, in the same order, in "plan" and "steps" of {path}; they differ.')
+    return SavedPlan(problem, tuple(s["action"] for s in steps), tuple(map(_how, steps)), document)
+
+
+def _how(step: Mapping[str, Any]) -> Any:
+    if "parts" in step:
+        return Way.from_json(step)
+    given = step.get("how")
+    # A direction, as the oracle gave it; a path of poses stays a list.
+    if isinstance(given, list) and len(given) == 3 and all(isinstance(v, int | float) for v in given):
+        return tuple(given)
+    return given
+
+
+def problem_of(document: Mapping[str, Any], path: str | Path = "plan.json") -> Problem:
+    """The problem that a plan's file was made for, made again.
+
+    Raises:
+        InputError: the file does not say which problem it was.
+    """
+    domain, options = document.get("domain"), document.get("options") or {}
+    if not isinstance(domain, str) or not isinstance(options, dict):
+        raise InputError(f'Expected "domain" (a name) and "options" in {path}; got {domain!r} and {options!r}.')
+    family = load_domain(domain)
+    try:
+        if document.get("cells") is not None:
+            made: Problem = family.problem_from_cells(document["cells"], **options)  # type: ignore[attr-defined]
+        elif document.get("assembly") is not None:
+            made = family.problem(referenced(document["assembly"], Path(path)), name=document.get("problem"), **options)
+        elif document.get("number") is not None:
+            made = family.problem(document["number"], **options)
+        else:
+            raise InputError(
+                f'Expected {path} to say which problem it solves ("number", "cells" or "assembly"); it says none.'
+            )
+    except (AttributeError, TypeError) as error:
+        raise InputError(f"Expected {path} to name a problem of {domain!r}, with options that fit; {error}.") from None
+    return made
+
+
+def read_document(path: Path) -> dict[str, Any]:
+    try:
+        document = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        said = error.strerror or error
+        raise InputError(f"Expected a plan at {path}; {said}. Write one with `neurosym plan ... --out`.") from None
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"Expected JSON, as `neurosym plan --out` writes it, in {path}; got: {error}.") from None
+    if not isinstance(document, dict):
+        raise InputError(f"Expected a JSON object, as `neurosym plan --out` writes it, in {path}; got something else.")
+    return document

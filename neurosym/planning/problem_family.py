@@ -1,0 +1,90 @@
+"""Problem families: a symbolic domain with its problems, pictures and known facts. `load_domain` gives one."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from neurosym.language.domain import Domain, Problem
+    from neurosym.planning.demonstrations import Demonstrations
+
+#: Called with (done, total) while long work goes on.
+Progress = Callable[[int, int], None]
+
+
+class ProblemFamily(ABC):
+    """What an entry point in ``neurosym.domains`` names.
+
+    Attributes:
+        name: the name it is registered under.
+        domain: the symbols.
+        reference: where the task and its numbers come from.
+        published: rows of published figures, shown beside ours by `compare`.
+    """
+
+    name: ClassVar[str]
+    domain: Domain
+    reference: ClassVar[str]
+    published: ClassVar[Sequence[Mapping[str, Any]]] = ()
+
+    @abstractmethod
+    def problem(self, *args: Any, **options: Any) -> Problem:
+        """One problem, by its number in the family."""
+
+    @abstractmethod
+    def problems(self, part: str = "test", *, split: int = 0, **options: Any) -> Sequence[Problem]:
+        """The problems of a part, ``"train"``, ``"test"`` or ``"all"``; "train" and "test" never overlap."""
+
+    def numbers(self, part: str = "test", *, split: int = 0) -> Sequence[int]:
+        """Numbers of the problems of a part, as `problem` takes them; benchmarks rebuild problems from these."""
+        raise NotImplementedError(f"the domain {self.name!r} does not number its problems")
+
+    def pictures(
+        self, problem: Problem, *, style: str = "clean", rng: np.random.Generator | None = None
+    ) -> NDArray[np.uint8]:
+        """Pictures of the finished work, uint8 (V, H, W, 3)."""
+        raise NotImplementedError(f"the domain {self.name!r} has no pictures")
+
+    def observed(
+        self, problems: Sequence[Problem], *, workers: int = 1, progress: Progress | None = None
+    ) -> list[Problem]:
+        """The same problems with their pictures taken, all of a style in one go (`take_pictures`)."""
+        found = list(problems)
+        for style in sorted({str(p.details.get("pictures")) for p in problems}):
+            chosen = [i for i, p in enumerate(problems) if str(p.details.get("pictures")) == style]
+            own = [problems[i] for i in chosen]
+            views = self.take_pictures(own, style=style, workers=workers, progress=progress)
+            for i, view in zip(chosen, () if views is None else views):
+                found[i] = problems[i].with_pictures(view)
+        return found
+
+    def take_pictures(
+        self, problems: Sequence[Problem], *, style: str, workers: int = 1, progress: Progress | None = None
+    ) -> NDArray[np.uint8] | None:
+        """Pictures of many problems of one style, uint8 (M, V, H, W, 3): those that each would take by itself.
+
+        None, the default, leaves it to the problems.
+        """
+        return None
+
+    def demonstrations(
+        self,
+        part: str = "train",
+        *,
+        split: int = 0,
+        recipe: str = "full",
+        style: str = "clean",
+        seed: int = 0,
+        progress: Progress | None = None,
+    ) -> Demonstrations:
+        """Pictures with orders to learn from, for a training recipe (``"full"`` or ``"paper"``)."""
+        raise NotImplementedError(f"the domain {self.name!r} has no demonstrations")
+
+    def known_facts(self) -> dict[str, tuple[Any, Callable[[], Any]]]:
+        """Published facts: name -> (published value, function that recomputes it). Tests compare them."""
+        return {}

@@ -1,0 +1,125 @@
+"""Independent replay of an order. Shares no code with planners or grounding, and asks geometry afresh."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from neurosym.errors import InputError, UnknownNameError
+from neurosym.language.search_problem import Rejection, SearchProblem
+from neurosym.language.state import AtomSet
+from neurosym.language.terms import Derived, Literal
+
+if TYPE_CHECKING:
+    from neurosym.language.domain import Problem
+
+
+@dataclass(frozen=True)
+class Validation:
+    """What a replay found. Truthy exactly when the order is a plan.
+
+    Attributes:
+        ok: every action could be done, and the goal holds at the end.
+        failed_at: number of the first action (from 0) that could not; the order's length when all could but
+            the goal is missed; None when ok.
+        because: names of the objects that decided it.
+        reason: one sentence.
+    """
+
+    ok: bool
+    failed_at: int | None = None
+    because: tuple[str, ...] = ()
+    reason: str = "Every action can be done, and the goal is reached."
+
+    def __bool__(self) -> bool:
+        return self.ok
+
+
+def validate(problem: Problem, order: Sequence[str], how: Sequence[Any] = ()) -> Validation:
+    """Replay an order, given as names of action primitives (for Soma the pieces' letters).
+
+    Args:
+        how: one entry a step, as `PlanResult.how` has them: then each step must be possible in this way. Empty: in
+            any way.
+
+    Raises:
+        UnknownNameError: a name that is no action of the problem's domain.
+        InputError: not one `how` a step.
+    """
+    if not hasattr(problem, "domain"):
+        raise InputError(f"Expected a Problem, as Domain.problem makes it; got {problem!r}.")
+    if not isinstance(order, Sequence):
+        raise InputError(f"Expected an order as a list of names of action primitives; got {order!r}.")
+    if len(how) not in (0, len(order)):
+        raise InputError(f"Expected one `how` a step, {len(order)} in all, or none; got {len(how)}.")
+    ground = {}
+    for action in problem.domain.actions:
+        for binding in problem.bindings(action):
+            ground[action.ground_name(binding)] = (action, binding)
+    for name in order:
+        if not isinstance(name, str) or name not in ground:
+            raise UnknownNameError("action primitive", name, ground)
+    if problem.rules is not None:
+        return problem.rules.replay(problem, order, how)
+    world = problem.world.afresh() if hasattr(problem.world, "afresh") else problem.world
+    state = AtomSet(set(problem.init), tuple(problem.type_of))
+    done: list[str] = []
+    possible = set(problem.actions)
+
+    def failure(literals: Sequence[Literal], way: Any = None) -> tuple[tuple[str, ...], str] | None:
+        for literal in sorted(literals, key=lambda x: isinstance(x.atom.predicate, Derived)):
+            predicate = literal.atom.predicate
+            if isinstance(predicate, Derived):
+                if way is not None and predicate.check is not None:
+                    verdict = predicate.check(world, state, way, *literal.atom.args)
+                else:
+                    verdict = predicate.function(world, state, *literal.atom.args)
+                if verdict.holds is not literal.positive:
+                    return verdict.because, verdict.reason or f"{literal} is not true."
+            elif state.holds(literal.atom) is not literal.positive:
+                return tuple(a for a in literal.atom.args if isinstance(a, str)), f"{literal} is not true."
+        return None
+
+    for step, name in enumerate(order):
+        if name in done:
+            # What the domain itself says of doing it again, a tower that comes down for instance, is worth hearing.
+            action, binding = ground[name]
+            again = failure([p.bind(binding) for p in action.pre])
+            said = f"{name} was done already, as step {done.index(name)}." + (f" {again[1]}" if again else "")
+            return Validation(False, step, (name,), said)
+        for first, then in problem.before:
+            if then == name and first in possible and first not in done:
+                return Validation(False, step, (first,), f"{name} may be done only after {first}.")
+        action, binding = ground[name]
+        wrong = failure([p.bind(binding) for p in action.pre], how[step] if how else None)
+        if wrong is not None:
+            return Validation(False, step, wrong[0], f"Step {step}, {name}: {wrong[1]}")
+        effects = [e.bind(binding) for e in action.eff]
+        state.atoms -= {e.atom for e in effects if not e.positive}
+        state.atoms |= {e.atom for e in effects if e.positive}
+        done.append(name)
+    wrong = failure(problem.goal)
+    if wrong is not None:
+        return Validation(False, len(order), wrong[0], f"After all {len(order)} actions the goal is missed: {wrong[1]}")
+    return Validation(True)
+
+
+def replay(problem: SearchProblem[Any], order: Sequence[str]) -> Validation:
+    """The same for a bare `SearchProblem`, whose oracle is asked; for physics give it a fresh simulation."""
+    index = {name: i for i, name in enumerate(problem.actions)}
+    state = problem.initial
+    for step, name in enumerate(order):
+        if name not in index:
+            raise UnknownNameError("action primitive", name, index)
+        if name in order[:step]:
+            return Validation(False, step, (name,), f"{name} was done already.")
+        if index[name] not in set(problem.candidates(state)):
+            return Validation(False, step, (name,), f"Step {step}: {name} is not applicable.")
+        answer = problem.attempt(state, index[name])
+        if isinstance(answer, Rejection):
+            return Validation(False, step, answer.because, f"Step {step}, {name}: {answer.reason}")
+        state = answer.state
+    if not problem.is_goal(state):
+        return Validation(False, len(order), (), f"After all {len(order)} actions the goal is missed.")
+    return Validation(True)

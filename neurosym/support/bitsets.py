@@ -1,0 +1,39 @@
+"""Sets of small numbers as Python integers, a bit a number."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+from numpy.typing import NDArray
+
+#: Up to so many bodies a table of all pairs is filled at once (16 MB).
+_DENSE = 4_000
+
+
+def bitsets(pairs: NDArray[np.int64], count: int) -> list[int]:
+    """For pairs (i, j), int64 (k, 2), of numbers below `count`: per i, a bitset of its j."""
+    if count <= _DENSE:
+        table = np.zeros((count, count), dtype=bool)
+        table[pairs[:, 0], pairs[:, 1]] = True
+        rows = np.packbits(table, axis=1, bitorder="little")
+        width, packed = rows.shape[1], rows.tobytes()
+        return [int.from_bytes(packed[width * i : width * (i + 1)], "little") for i in range(count)]
+    found = []
+    order = np.argsort(pairs[:, 0], kind="stable")
+    ends = np.searchsorted(pairs[order, 0], np.arange(count + 1))
+    for start, stop in itertools.pairwise(ends):
+        row = np.zeros(count, dtype=bool)
+        row[pairs[order[start:stop], 1]] = True
+        found.append(int.from_bytes(np.packbits(row, bitorder="little").tobytes(), "little"))
+    return found
+
+
+def bits(mask: int) -> list[int]:
+    """Numbers of the bits that are set."""
+    found = []
+    while mask:
+        low = mask & -mask
+        found.append(low.bit_length() - 1)
+        mask ^= low
+    return found
