@@ -20,8 +20,8 @@ from neurosym.errors import AssemblyError, InputError, UnknownNameError
 from neurosym.geometry.assembly import NO_TABLE, Assembly
 from neurosym.geometry.blocking.directions import Directions, directions_for
 from neurosym.language import Domain, Problem
-from neurosym.language.domain import as_names
-from neurosym.planning.problem_family import ProblemFamily
+from neurosym.language.problem import as_names
+from neurosym.language.problem_family import ProblemFamily
 
 #: What `paths` may be.
 PATHS = ("straight", "any")

@@ -29,11 +29,11 @@ from neurosym.errors import InputError
 from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.step_motion import Way
 from neurosym.language import Action, Domain, Fluent, GroundProblem, Problem, Type
+from neurosym.language.explanation import WhyNot
 from neurosym.language.search_problem import Rejection, Step, Verdict
-from neurosym.planning.explanation import WhyNot, listed
-from neurosym.planning.planner import PlanResult, Status
-from neurosym.planning.validation import Validation
+from neurosym.language.semantics import Semantics, Validation
 from neurosym.support.bitsets import bits
+from neurosym.support.words import listed
 
 if TYPE_CHECKING:
     from domains.assembly import Setting
@@ -59,7 +59,6 @@ def apart_in_groups(
     """The problem in which an action, named by a part, splits that part's block."""
     pairs = tuple(before)
     anchors = assembly.fixed or (_lowest(assembly, setting, pairs),)
-    rules = GroupRules(assembly, setting, assembly.mask(anchors))
     split = Action("split", _p, pre=[~apart(_p), ~anchor(_p)], eff=[apart(_p)], label="{p}")
     return Domain("assembly-groups", fluents=[apart, anchor], actions=[split]).problem(
         world=assembly,
@@ -70,9 +69,7 @@ def apart_in_groups(
         name=name,
         family=family,
         details={**details, "anchor": list(anchors)},
-        rules=rules,
-        explain=rules.explain,
-        refute=rules.refute,
+        semantics=GroupSemantics(assembly, setting, assembly.mask(anchors)),
     )
 
 
@@ -95,18 +92,16 @@ def _lowest(assembly: Assembly, setting: Setting, before: Sequence[tuple[str, st
     return min(free, key=key)
 
 
-class GroupRules:
-    """What a split changes (`neurosym.language.domain.Rules`): the search over partitions, and its replay."""
+class GroupSemantics(Semantics):
+    """What a split changes: the search over partitions, and its replay."""
 
     def __init__(self, assembly: Assembly, setting: Setting, anchors: int) -> None:
         self.assembly, self.setting, self.anchors = assembly, setting, anchors
         #: Whether one block stands: on a ground, around fixed parts, or under gravity.
         self.standing = setting.gravity or assembly.has_table or bool(assembly.fixed)
-        self._search: GroupSearch | None = None
 
-    def search(self, symbols: GroundProblem) -> GroupSearch:
-        self._search = GroupSearch(self, symbols)
-        return self._search
+    def search(self, problem: Problem) -> GroupSearch:
+        return GroupSearch(self, problem.symbols)
 
     def replay(self, problem: Problem, order: Sequence[str], how: Sequence[Any]) -> Validation:
         """Replays an order on blocks that are plain sets; each split is asked of the pairs concerned, afresh."""
@@ -155,7 +150,7 @@ class GroupRules:
         said = f"The assembly does not stand as it is: {listed(falling)} would fall."
         return Verdict(answer.stands, () if answer.stands else falling, "" if answer.stands else said)
 
-    def refute(self) -> WhyNot | None:
+    def refute(self, problem: Problem) -> WhyNot | None:
         """A proof that some block never comes apart, even without gravity, where any order of splits will do."""
         if self.setting.paths == "any" and grid_of(self.assembly) is None:
             return None  # the searches for paths prove nothing
@@ -183,24 +178,24 @@ class GroupRules:
                     return replace(why, relaxed=self.setting.gravity)
         return None
 
-    def explain(self, result: PlanResult) -> WhyNot | None:
+    def explain(self, problem: Problem, done: Sequence[str]) -> WhyNot | None:
         """Why the blocks that are left after the longest prefix do not come apart."""
-        if result.status is Status.OUT_OF_BUDGET or self._search is None:
-            return None
-        search, state = self._search, self._search.initial
-        for name in result.best_prefix:
+        search = problem.ground()
+        assert isinstance(search, GroupSearch)
+        state = search.initial
+        for name in done:
             answer = search.attempt(state, search.actions.index(name))
             assert isinstance(answer, Step)
             state = answer.state
         refused = {a: search.attempt(state, a) for a in search.candidates(state)}
         stuck = {search.actions[a]: r for a, r in refused.items() if isinstance(r, Rejection)}
-        return explain_groups(self.assembly, self.setting, result.best_prefix, search.blocks(state), stuck)
+        return explain_groups(self.assembly, self.setting, tuple(done), search.blocks(state), stuck)
 
 
 class GroupSearch:
     """The `SearchProblem` over partitions."""
 
-    def __init__(self, rules: GroupRules, symbols: GroundProblem) -> None:
+    def __init__(self, rules: GroupSemantics, symbols: GroundProblem) -> None:
         self.rules, self.symbols = rules, symbols
         self.assembly = rules.assembly
         self.splitter = Splitter(rules.assembly, rules.setting)

@@ -11,8 +11,8 @@ from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.paths.grid import GridCells, cells_of
 from neurosym.geometry.paths.voxel_moves import Separation, Stuck, first_separation, separation_path
 from neurosym.geometry.step_motion import Way
-from neurosym.planning.explanation import listed
 from neurosym.support.bitsets import bits
+from neurosym.support.words import listed
 
 #: Poses and ways that each kind of search may ask for one way out (`geometry.paths.extraction`): seconds, mostly.
 MAX_CHECKS = 100_000

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from functools import partial
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,11 +12,13 @@ from domains.assembly_paths import NoWay, ground_of, way_out
 from domains.assembly_why import explain_removal, refute_removal
 from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.blocking.sweep import exits_along
-from neurosym.geometry.step_motion import Way
+from neurosym.geometry.step_motion import GROUND, Way
 from neurosym.language import Action, Derived, Domain, Fluent, Problem, Simulation, State, Type, formulas, predicates
+from neurosym.language.explanation import WhyNot
 from neurosym.language.search_problem import Verdict
-from neurosym.planning.explanation import GROUND, listed
+from neurosym.language.semantics import Semantics
 from neurosym.support.bitsets import bits
+from neurosym.support.words import listed
 
 if TYPE_CHECKING:
     from domains.assembly import Setting
@@ -41,7 +43,6 @@ def apart_one_by_one(
     if setting.gravity:
         geometry += [stands_at_first(setting)(), predicates.stable_without(present, held=setting.held)(_p)]
     remove = Action("remove", _p, pre=[present(_p), ~fixed(_p), *geometry], eff=[~present(_p)], label="{p}")
-    pairs = tuple(before)
     loose = [n for n in assembly.names if n not in assembly.fixed]
     judged_alike = setting.gravity and not setting.held and not assembly.fixed and setting.paths == "straight"
     return Domain("assembly", fluents=[present, fixed], actions=[remove]).problem(
@@ -49,14 +50,26 @@ def apart_one_by_one(
         objects={part: assembly.names},
         init=[*(present(n) for n in assembly.names), *(fixed(n) for n in assembly.fixed)],
         goal=[~present(n) for n in loose],
-        before=pairs,
+        before=before,
         name=name,
         family=family,
         simulation=Simulation("rigid", {n: n for n in loose}) if judged_alike else None,
         details=details,
-        explain=partial(explain_removal, assembly, setting, pairs),
-        refute=partial(refute_removal, assembly, setting),
+        semantics=RemovalSemantics(setting),
     )
+
+
+@dataclass(frozen=True)
+class RemovalSemantics(Semantics):
+    """Why an assembly does not come apart part by part."""
+
+    setting: Setting
+
+    def refute(self, problem: Problem) -> WhyNot | None:
+        return refute_removal(problem.world, self.setting)
+
+    def explain(self, problem: Problem, done: Sequence[str]) -> WhyNot | None:
+        return explain_removal(problem.world, self.setting, problem.before, tuple(done))
 
 
 def can_leave(setting: Setting) -> Derived:

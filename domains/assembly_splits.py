@@ -21,8 +21,8 @@ from neurosym.geometry.blocking.sweep import exits_along
 from neurosym.geometry.step_motion import Way
 from neurosym.language.predicates import stands
 from neurosym.language.search_problem import Verdict
-from neurosym.planning.explanation import listed
 from neurosym.support.bitsets import bits
+from neurosym.support.words import listed
 
 if TYPE_CHECKING:
     from domains.assembly import Setting

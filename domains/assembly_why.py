@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING
 from domains.assembly_paths import NoWay, way_out
 from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.step_motion import Way
+from neurosym.language.explanation import Blocked, Cycle, Fall, WhyNot, blockers_of, smallest_cycle
 from neurosym.language.predicates import losses
 from neurosym.language.search_problem import Rejection
-from neurosym.planning.explanation import Blocked, Cycle, Fall, WhyNot, blockers_of, smallest_cycle
-from neurosym.planning.planner import PlanResult, Status
 from neurosym.support.bitsets import bits
 
 if TYPE_CHECKING:
@@ -44,12 +43,9 @@ def refute_removal(assembly: Assembly, setting: Setting) -> WhyNot | None:
 
 
 def explain_removal(
-    assembly: Assembly, setting: Setting, before: Sequence[tuple[str, str]], result: PlanResult
-) -> WhyNot | None:
-    """Why nothing more can be removed after the longest prefix that works; None where a budget ended the search."""
-    if result.status is Status.OUT_OF_BUDGET:
-        return None
-    done = result.best_prefix
+    assembly: Assembly, setting: Setting, before: Sequence[tuple[str, str]], done: tuple[str, ...]
+) -> WhyNot:
+    """Why nothing more can be removed after `done`, the longest prefix that works."""
     there = (1 << len(assembly)) - 1 & ~assembly.mask(done)
     graph = assembly.blocking(setting.directions)
     blocked: list[Blocked] = []

@@ -21,8 +21,8 @@ from domains.scrabble_rules import DOMAIN, Reference, all_slots_filled, laid, ti
 from domains.scrabble_tiles import COUNTS, LONGEST, N_TEST, N_TRAIN, SHORTEST, TILES, VALUES
 from neurosym.errors import InputError, UnknownNameError
 from neurosym.language import Atom, Problem
-from neurosym.planning.demonstrations import Demonstrations
-from neurosym.planning.problem_family import ProblemFamily, Progress
+from neurosym.language.demonstrations import Demonstrations
+from neurosym.language.problem_family import ProblemFamily, Progress
 from neurosym.planning.staging import Staging
 
 #: How many problems of a part are meant where nobody says how many: enough for `compare`, and for its blind baseline.
@@ -86,18 +86,13 @@ class ScrabbleFamily(ProblemFamily):
         Raises:
             InputError: the word cannot be laid, or does not begin with the tiles that lie already.
         """
-        from domains.scrabble_drawing import draw_word, style_named
+        from domains.scrabble_drawing import style_named
 
         names = scrabble_tiles.first_tiles(tiles)
         letters = scrabble_tiles.checked_word(word, tiles)
         style = style_named(pictures)
         first = tuple(start)
         init = _initial(letters, first, names)
-
-        def stage(plan: Sequence[str], how: Sequence[Any] = ()) -> Staging:
-            from domains.scrabble_staging import laid_out
-
-            return laid_out(first, plan)
 
         return DOMAIN.problem(
             world=Reference(letters, names, len(init)),
@@ -107,9 +102,8 @@ class ScrabbleFamily(ProblemFamily):
             interchangeable=_by_letter(names),
             name=name or letters,
             family=self.name,
-            observe=lambda: draw_word(letters, style, np.random.default_rng(seed)),
-            stage=stage,
-            details={"word": letters, "tiles": len(names), "pictures": style.name, "seed": seed},
+            details={"word": letters, "tiles": len(names), "pictures": style.name, "seed": seed, "start": first},
+            semantics=self,
         )
 
     def numbers(self, part: str = "test", *, split: int = 0, count: int | None = None) -> range | tuple[int, ...]:
@@ -132,6 +126,17 @@ class ScrabbleFamily(ProblemFamily):
     ) -> list[Problem]:
         """The first `count` problems of a part (default: see `numbers`), with the options of `problem`."""
         return [self.problem(n, **options) for n in self.numbers(part, split=split, count=count)]
+
+    def observe(self, problem: Problem) -> NDArray[np.uint8]:
+        from domains.scrabble_drawing import draw_word, style_named
+
+        details = problem.details
+        return draw_word(details["word"], style_named(details["pictures"]), np.random.default_rng(details["seed"]))
+
+    def staging(self, problem: Problem, plan: Sequence[str], how: Sequence[Any]) -> Staging:
+        from domains.scrabble_staging import laid_out
+
+        return laid_out(problem.details["start"], plan)
 
     def pictures(
         self, problem: Problem, *, style: str = "easy", rng: np.random.Generator | None = None

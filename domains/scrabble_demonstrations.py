@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from domains.scrabble_tiles import COUNTS, LONGEST
 from neurosym.errors import UnknownNameError
-from neurosym.planning.demonstrations import Demonstrations
-from neurosym.planning.problem_family import Progress
+from neurosym.language.demonstrations import Demonstrations
+from neurosym.language.problem_family import Progress
 
 RECIPES = ("full", "paper")
 

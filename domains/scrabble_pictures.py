@@ -14,7 +14,7 @@ import PIL
 from numpy.typing import NDArray
 
 from domains.scrabble_drawing import HEIGHT, WIDTH, Style, draw_word, style_named
-from neurosym.planning.problem_family import Progress
+from neurosym.language.problem_family import Progress
 from neurosym.support.files import replacing
 
 #: Raise it whenever the same request would give other pixels.

@@ -18,9 +18,9 @@ from domains.soma_pieces import LETTERS, Cell, solutions
 from neurosym.errors import AssemblyError, InputError, UnknownNameError
 from neurosym.geometry.assembly import Assembly
 from neurosym.language import Action, Domain, Fluent, Problem, Simulation, Type, predicates
-from neurosym.language.domain import as_names
-from neurosym.planning.demonstrations import Demonstrations
-from neurosym.planning.problem_family import ProblemFamily, Progress
+from neurosym.language.demonstrations import Demonstrations
+from neurosym.language.problem import as_names
+from neurosym.language.problem_family import ProblemFamily, Progress
 
 piece = Type("piece")
 present = Fluent("present", piece)
@@ -168,9 +168,6 @@ class SomaFamily(ProblemFamily):
             bodies: Literal["cubes", "rigid"] = "rigid" if collapse == "rigid" else "cubes"
             simulation = Simulation(bodies, {n: n for n in assembly.names}, gone)
 
-        def observe() -> NDArray[np.uint8]:
-            return render_views(assembly, pictures, np.random.default_rng(seed))
-
         return DOMAINS[collapse].problem(
             world=assembly,
             objects={piece: assembly.names},
@@ -179,9 +176,9 @@ class SomaFamily(ProblemFamily):
             before=before,
             name=name,
             family=self.name,
-            observe=observe,
-            simulation=simulation,
             details={"collapse": collapse, "pictures": pictures, "seed": seed},
+            simulation=simulation,
+            semantics=self,
         )
 
     def numbers(self, part: str = "test", *, split: int = 0) -> tuple[int, ...]:
@@ -198,6 +195,10 @@ class SomaFamily(ProblemFamily):
     def problems(self, part: str = "test", *, split: int = 0, **options: Any) -> list[Problem]:
         """The cubes of a part, with the options of `problem`."""
         return [self.problem(n, **options) for n in self.numbers(part, split=split)]
+
+    def observe(self, problem: Problem) -> NDArray[np.uint8]:
+        rng = np.random.default_rng(problem.details["seed"])
+        return render_views(problem.world, problem.details["pictures"], rng)
 
     def pictures(
         self, problem: Problem, *, style: str = "clean", rng: np.random.Generator | None = None

@@ -21,9 +21,9 @@ from numpy.typing import NDArray
 from domains.soma_pieces import LETTERS, Cell, symmetries, turned
 from neurosym.errors import ContractError, InputError, UnknownNameError
 from neurosym.geometry.assembly import Assembly
+from neurosym.language.demonstrations import Demonstrations
+from neurosym.language.problem_family import Progress
 from neurosym.language.search_problem import Step
-from neurosym.planning.demonstrations import Demonstrations
-from neurosym.planning.problem_family import Progress
 from neurosym.registry import load_planner
 from neurosym.support.files import replacing
 

@@ -21,8 +21,8 @@ from domains.tower_pictures import draw_offsets, picture_seed, setting_named, ta
 from domains.tower_variants import TALLEST, VARIANTS, blocks_of, sequences, split_numbers, towers
 from neurosym.errors import AssemblyError, InputError, UnknownNameError
 from neurosym.language import Problem
-from neurosym.planning.demonstrations import Demonstrations
-from neurosym.planning.problem_family import ProblemFamily, Progress
+from neurosym.language.demonstrations import Demonstrations
+from neurosym.language.problem_family import ProblemFamily, Progress
 from neurosym.planning.staging import Staging, building
 
 
@@ -105,13 +105,6 @@ class TowerFamily(ProblemFamily):
         for n in at_hand:
             alike.setdefault(tower.kinds[n], []).append(n)
 
-        def observe() -> NDArray[np.uint8]:
-            return take_picture(tower, style, np.random.default_rng(seed))
-
-        def stage(plan: Sequence[str], how: Sequence[Any] = ()) -> Staging:
-            order = (*standing, *plan)
-            return building(tower.built(order), standing, plan, {n: COLOURS[tower.kinds[n][0]] for n in order})
-
         return self.domain.problem(
             world=tower,
             objects={rules.block: tower.names},
@@ -121,9 +114,8 @@ class TowerFamily(ProblemFamily):
             interchangeable=list(alike.values()),
             name=name,
             family=self.name,
-            observe=observe,
-            stage=stage,
             details={"pictures": style, "seed": seed, "colours": tower.colours},
+            semantics=self,
         )
 
     def numbers(
@@ -144,6 +136,15 @@ class TowerFamily(ProblemFamily):
         """The towers of a part, with the options of `problem`."""
         numbers = self.numbers(part, split=split, variant=variant, by=by)
         return [self.problem(n, variant=variant, **options) for n in numbers]
+
+    def observe(self, problem: Problem) -> NDArray[np.uint8]:
+        return take_picture(problem.world, problem.details["pictures"], np.random.default_rng(problem.details["seed"]))
+
+    def staging(self, problem: Problem, plan: Sequence[str], how: Sequence[Any]) -> Staging:
+        tower = problem.world
+        standing = tuple(str(atom.args[0]) for atom in problem.init if atom.predicate == rules.placed)
+        order = (*standing, *plan)
+        return building(tower.built(order), standing, plan, {n: COLOURS[tower.kinds[n][0]] for n in order})
 
     def pictures(
         self, problem: Problem, *, style: str = "easy", rng: np.random.Generator | None = None

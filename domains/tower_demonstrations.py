@@ -17,8 +17,8 @@ from domains.tower_blocks import ReferenceTower
 from domains.tower_pictures import draw_offsets, picture_seed, take_pictures
 from domains.tower_variants import TALLEST, blocks_of, colours_of, sequence_numbers, towers
 from neurosym.errors import UnknownNameError
-from neurosym.planning.demonstrations import Demonstrations
-from neurosym.planning.problem_family import Progress
+from neurosym.language.demonstrations import Demonstrations
+from neurosym.language.problem_family import Progress
 
 RECIPES = ("full", "paper")
 #: Apart from the streams of pictures and offsets.

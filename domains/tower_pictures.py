@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from domains.tower_blocks import COLOURS, ReferenceTower
 from neurosym.errors import UnknownNameError
-from neurosym.planning.problem_family import Progress
+from neurosym.language.problem_family import Progress
 
 if TYPE_CHECKING:
     from neurosym.simulation.looks import Camera, Style

@@ -17,7 +17,7 @@ from learned_priors.metrics import whole_order_accuracy
 from learned_priors.networks import Logits, NetworkConfig, OrderNetwork
 from learned_priors.recipes import TrainConfig
 from neurosym.errors import InputError
-from neurosym.planning.demonstrations import Demonstrations
+from neurosym.language.demonstrations import Demonstrations
 
 #: Pictures prepared, or read, at a time: bounds the memory that float copies of them take.
 CHUNK = 256

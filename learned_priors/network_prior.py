@@ -19,11 +19,11 @@ from learned_priors.networks import Logits, NetworkConfig, OrderNetwork
 from learned_priors.recipes import RECIPES, Recipe, TrainConfig, recipe_named
 from learned_priors.training import FitProgress, fit
 from neurosym.errors import CheckpointError, InputError
-from neurosym.planning.demonstrations import Demonstrations
+from neurosym.language.demonstrations import Demonstrations
 from neurosym.planning.prior import OrderScores, Prior, as_picture_batch
 
 if TYPE_CHECKING:
-    from neurosym.language.domain import Problem
+    from neurosym.language.problem import Problem
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,7 +17,7 @@ from learned_priors.checkpoints import read_tensors, write_tensors
 from learned_priors.networks import NetworkConfig, OrderNetwork
 from learned_priors.recipes import TrainConfig
 from neurosym.errors import CheckpointError
-from neurosym.planning.demonstrations import Demonstrations
+from neurosym.language.demonstrations import Demonstrations
 
 _KIND = "training-state"
 

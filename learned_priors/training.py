@@ -24,7 +24,7 @@ from learned_priors.networks import NetworkConfig, OrderNetwork
 from learned_priors.recipes import TrainConfig
 from learned_priors.resume import RunState, fingerprint, load_state, save_state
 from neurosym.errors import DemonstrationError, InputError
-from neurosym.planning.demonstrations import Demonstrations
+from neurosym.language.demonstrations import Demonstrations
 
 #: Keep the draws for the order of an epoch and for what is held out apart from other uses of the seed.
 _ORDER, _SPLIT = 1, 3

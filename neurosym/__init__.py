@@ -31,8 +31,8 @@ _HOMES = {
         "NeurosymError",
         "UnknownNameError",
     ),
-    "neurosym.planning.demonstrations": ("Demonstrations",),
-    "neurosym.planning.problem_family": ("ProblemFamily",),
+    "neurosym.language.demonstrations": ("Demonstrations",),
+    "neurosym.language.problem_family": ("ProblemFamily",),
     "neurosym.geometry.assembly": ("Assembly",),
     "neurosym.language": (
         "Action",
@@ -42,6 +42,7 @@ _HOMES = {
         "Fluent",
         "GroundProblem",
         "Problem",
+        "Semantics",
         "State",
         "Type",
         "derived",
@@ -101,10 +102,13 @@ if TYPE_CHECKING:
     from neurosym.language import Fluent as Fluent
     from neurosym.language import GroundProblem as GroundProblem
     from neurosym.language import Problem as Problem
+    from neurosym.language import Semantics as Semantics
     from neurosym.language import State as State
     from neurosym.language import Type as Type
     from neurosym.language import derived as derived
     from neurosym.language import predicates as predicates
+    from neurosym.language.demonstrations import Demonstrations as Demonstrations
+    from neurosym.language.problem_family import ProblemFamily as ProblemFamily
     from neurosym.language.search_problem import Rejection as Rejection
     from neurosym.language.search_problem import SearchProblem as SearchProblem
     from neurosym.language.search_problem import Step as Step
@@ -112,7 +116,6 @@ if TYPE_CHECKING:
     from neurosym.pipeline import count_plans as count_plans
     from neurosym.pipeline import plans as plans
     from neurosym.pipeline import solve as solve
-    from neurosym.planning.demonstrations import Demonstrations as Demonstrations
     from neurosym.planning.planner import Budget as Budget
     from neurosym.planning.planner import Planner as Planner
     from neurosym.planning.planner import PlannerTraits as PlannerTraits
@@ -124,7 +127,6 @@ if TYPE_CHECKING:
     from neurosym.planning.prior import Prior as Prior
     from neurosym.planning.prior import RandomPrior as RandomPrior
     from neurosym.planning.prior import UniformPrior as UniformPrior
-    from neurosym.planning.problem_family import ProblemFamily as ProblemFamily
     from neurosym.planning.validation import Validation as Validation
     from neurosym.planning.validation import validate as validate
     from neurosym.registry import domain_names as domain_names

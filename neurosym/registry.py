@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from neurosym.errors import ContractError, InputError, UnknownNameError
+from neurosym.language.problem_family import ProblemFamily
 from neurosym.planning.planner import Planner
 from neurosym.planning.prior import Prior
-from neurosym.planning.problem_family import ProblemFamily
 
 T = TypeVar("T")
 

@@ -101,6 +101,11 @@ def test_overlapping_parts_wrong_facts_and_moody_pictures_are_caught():
         check_domain(Overlapping())
 
     rng = np.random.default_rng(0)
-    moody = dataclasses.replace(soma.problem(0), observe=lambda: rng.integers(0, 255, (4, 8, 8, 3), dtype=np.uint8))
+
+    class Moody(ns.Semantics):
+        def observe(self, problem):
+            return rng.integers(0, 255, (4, 8, 8, 3), dtype=np.uint8)
+
+    moody = dataclasses.replace(soma.problem(0), semantics=Moody())
     with pytest.raises(ns.ContractError, match="same pictures"):
         check_domain("soma", problems=[moody], facts=False, walks=1)

@@ -12,7 +12,7 @@ import torch
 from learned_priors.encoders import build_encoder
 from learned_priors.network_prior import NetworkPrior
 from learned_priors.networks import NetworkConfig, OrderNetwork
-from neurosym.planning.demonstrations import Demonstrations
+from neurosym.language.demonstrations import Demonstrations
 from neurosym.planning.weights_header import read_header
 from neurosym.registry import load_prior
 

@@ -23,7 +23,7 @@ from learned_priors.networks import NetworkConfig, OrderNetwork
 from learned_priors.recipes import RECIPES
 from learned_priors.tcn import TemporalDecoder, dilations
 from neurosym.errors import CheckpointError, ContractError, InputError, UnknownNameError
-from neurosym.planning.demonstrations import Demonstrations
+from neurosym.language.demonstrations import Demonstrations
 from neurosym.planning.prior import OrderScores, Prior, RandomPrior, UniformPrior
 from neurosym.registry import load_prior
 from neurosym.testing.priors import check_prior

@@ -17,7 +17,7 @@ import neurosym as ns
 from neurosym.cli import main
 from neurosym.errors import InputError, UnknownNameError
 from neurosym.geometry.stability.falls import find_falls
-from neurosym.language.domain import Problem
+from neurosym.language.problem import Problem
 from neurosym.pddl import gravity as pddl_gravity
 from neurosym.pddl.export import PddlTask, as_pddl, write_pddl
 from neurosym.pddl.names import RESERVED, Names

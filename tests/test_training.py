@@ -23,7 +23,7 @@ from learned_priors.recipes import RECIPES
 from learned_priors.sinkhorn import log_sinkhorn
 from learned_priors.training import FitProgress
 from neurosym.errors import CheckpointError, InputError, UnknownNameError
-from neurosym.planning.demonstrations import Demonstrations
+from neurosym.language.demonstrations import Demonstrations
 
 COLOURS = np.array([[220, 40, 40], [40, 200, 60], [50, 80, 220], [230, 210, 50]], dtype=np.uint8)
 TINY = replace(RECIPES["sinkhorn"].train, epochs=6, least_steps=0, batch=16)

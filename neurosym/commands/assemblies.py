@@ -14,7 +14,7 @@ from neurosym.errors import InputError
 if TYPE_CHECKING:
     from neurosym.geometry.assembly import Assembly
     from neurosym.geometry.readers.reading import Reading
-    from neurosym.language.domain import Problem
+    from neurosym.language.problem import Problem
 
 
 class Paths(StrEnum):

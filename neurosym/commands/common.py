@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from neurosym.errors import InputError
-from neurosym.planning.problem_family import ProblemFamily, Progress
+from neurosym.language.problem_family import ProblemFamily, Progress
 from neurosym.support.files import write_text
 
 if TYPE_CHECKING:

@@ -30,7 +30,7 @@ from neurosym.commands.common import (
 )
 from neurosym.errors import InputError, UnknownNameError
 from neurosym.experiments.engines import cores
-from neurosym.planning.problem_family import ProblemFamily
+from neurosym.language.problem_family import ProblemFamily
 
 if TYPE_CHECKING:
     from neurosym.experiments.benchmark import Comparison, Outcome

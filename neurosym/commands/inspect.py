@@ -9,7 +9,7 @@ from neurosym.commands.assemblies import AssemblyPath, FileOptions, Paths, Remov
 from neurosym.commands.common import AsJson, print_json
 
 if TYPE_CHECKING:
-    from neurosym.language.domain import Problem
+    from neurosym.language.problem import Problem
     from neurosym.planning.inspection import Inspection
 
 #: Lines of one kind that are shown; --json has all.

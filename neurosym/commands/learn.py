@@ -22,7 +22,7 @@ from neurosym.commands.common import (
 from neurosym.errors import InputError
 
 if TYPE_CHECKING:
-    from neurosym.planning.demonstrations import Demonstrations
+    from neurosym.language.demonstrations import Demonstrations
 
 
 def demos(
@@ -74,7 +74,7 @@ def train(
     if not (hasattr(learner, "fit") and hasattr(learner, "save")):
         raise InputError(f"Expected a prior that can be trained; {prior!r} cannot (it has no fit and save).")
     if demos_file is not None:
-        from neurosym.planning.demonstrations import Demonstrations
+        from neurosym.language.demonstrations import Demonstrations
 
         given = Demonstrations.load(demos_file)
     else:

@@ -29,12 +29,12 @@ from neurosym.errors import InputError
 from neurosym.geometry.blocking.directions import in_words
 from neurosym.geometry.step_motion import Way
 from neurosym.language.options import check_options
+from neurosym.language.problem_family import ProblemFamily
 from neurosym.planning.plan_files import SCHEMA
-from neurosym.planning.problem_family import ProblemFamily
 from neurosym.support.words import joined
 
 if TYPE_CHECKING:
-    from neurosym.language.domain import Problem
+    from neurosym.language.problem import Problem
     from neurosym.planning.planner import PlanResult
 
 #: The prior for assemblies, unless another is named.

@@ -21,15 +21,15 @@ from neurosym.experiments.engines import cores, run_tasks
 from neurosym.experiments.fixed_order import best_fixed_order, order_fails
 from neurosym.experiments.journal import Journal, key_of
 from neurosym.language.options import check_options
+from neurosym.language.problem_family import Progress
 from neurosym.language.search_problem import SearchProblem
-from neurosym.pipeline import ORACLES, check_plan, open_oracle
+from neurosym.pipeline import ORACLES, open_oracle, search_and_check
 from neurosym.planning.planner import Budget
 from neurosym.planning.prior import OrderScores, Prior
-from neurosym.planning.problem_family import Progress
 from neurosym.registry import load_domain, load_planner, load_prior
 
 if TYPE_CHECKING:
-    from neurosym.language.domain import Problem
+    from neurosym.language.problem import Problem
 
 #: The name of planning without a prior, in tables and on the command line.
 NO_PRIOR = "none"
@@ -228,7 +228,6 @@ def _solve_one(
 ) -> list[tuple[str, Run]]:
     """All the missing runs of one problem, so that its geometry is computed once."""
     problem = load_domain(comparison.domain).problem(number, **comparison.options)
-    replayed: set[tuple[str, ...]] = set()
     found = []
     with open_oracle(problem, comparison.oracle) as search:
         first = _FirstOrders(search, number, scores)
@@ -236,10 +235,9 @@ def _solve_one(
             own = scores[prior]
             own = None if own is None else own.restricted(problem.actions) if own.actions else own
             rng = np.random.default_rng([seed, number, zlib.crc32(planner.encode()), zlib.crc32(prior.encode())])
-            result = load_planner(planner).plan(search, own, budget=comparison.budget, rng=rng)
-            if result.plan is not None and result.plan not in replayed:
-                check_plan(problem, result.plan, comparison.oracle, planner)
-                replayed.add(result.plan)
+            [result] = search_and_check(
+                problem, search, load_planner(planner), own, budget=comparison.budget, rng=rng, oracle=comparison.oracle
+            )
             counts = (result.iterations, result.expansions, result.attempts, round(result.seconds, 7))
             failed = first.failed(prior, seed)
             found.append((key, Run(planner, prior, seed, number, result.status.name, *counts, failed)))

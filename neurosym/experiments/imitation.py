@@ -20,7 +20,7 @@ from neurosym.experiments.order_baselines import BASELINES
 from neurosym.experiments.studies import Study, Trial, study, study_names
 from neurosym.experiments.study_results import Results
 from neurosym.experiments.trials import run_trial
-from neurosym.planning.problem_family import Progress
+from neurosym.language.problem_family import Progress
 from neurosym.registry import load_prior
 
 __all__ = ["Results", "Study", "Trial", "report", "reproduce_study", "run_trial", "study", "study_names"]

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from neurosym.errors import InputError
-from neurosym.planning.demonstrations import Demonstrations
+from neurosym.language.demonstrations import Demonstrations
 
 #: How steps that are not taken are called, beside the classes.
 NONE = "none"

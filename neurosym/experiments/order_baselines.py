@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from neurosym.experiments.order_accuracy import classes_of, kinds, seen_in
-from neurosym.planning.demonstrations import Demonstrations
+from neurosym.language.demonstrations import Demonstrations
 
 Figures = dict[str, NDArray[np.float64]]
 

@@ -23,7 +23,7 @@ from neurosym.experiments.benchmark import Comparison, Outcome
 from neurosym.experiments.csv_lines import Record
 from neurosym.experiments.engines import connection, cores, run_tasks
 from neurosym.experiments.planning_report import report, write_results
-from neurosym.planning.problem_family import Progress
+from neurosym.language.problem_family import Progress
 from neurosym.registry import load_domain, load_prior
 from neurosym.support.files import write_text, written_whole
 

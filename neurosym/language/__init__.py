@@ -1,8 +1,10 @@
 """The symbolic language: types, objects, fluents, derived predicates, actions, domains and problems."""
 
 from neurosym.language.actions import Action
-from neurosym.language.domain import Domain, Problem, Simulation
+from neurosym.language.domain import Domain
 from neurosym.language.grounding import GroundProblem
+from neurosym.language.problem import Problem, Simulation
+from neurosym.language.semantics import Semantics
 from neurosym.language.state import State
 from neurosym.language.terms import Atom, Derived, Fluent, Literal, Type, Variable, derived
 
@@ -15,6 +17,7 @@ __all__ = [
     "GroundProblem",
     "Literal",
     "Problem",
+    "Semantics",
     "Simulation",
     "State",
     "Type",

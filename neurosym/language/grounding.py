@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 
 from neurosym.errors import ContractError, DefinitionError, UnknownNameError
 from neurosym.geometry.step_motion import Way
-from neurosym.language.domain import check_precedence
+from neurosym.language.problem import check_precedence
 from neurosym.language.search_problem import Rejection, Step, Verdict
 from neurosym.language.terms import Atom, Derived, Fluent, Literal
 
 if TYPE_CHECKING:
-    from neurosym.language.domain import Problem
+    from neurosym.language.problem import Problem
 
 
 class _Instance:

@@ -25,8 +25,8 @@ from neurosym.language import formulas
 from neurosym.language.search_problem import Verdict
 from neurosym.language.state import State
 from neurosym.language.terms import Atom, Derived, Fluent, Literal, Type
-from neurosym.planning.explanation import listed
 from neurosym.support.bitsets import bits
+from neurosym.support.words import listed
 
 
 def free(

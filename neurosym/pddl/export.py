@@ -21,7 +21,7 @@ from neurosym.pddl.strips import Fact, Mark, Strips, strips
 from neurosym.support.files import write_text
 
 if TYPE_CHECKING:
-    from neurosym.language.domain import Problem
+    from neurosym.language.problem import Problem
 
 #: Time for what has to be searched: the falls under gravity, or the states of a domain without formulas (seconds).
 SECONDS = 60.0
@@ -90,7 +90,7 @@ def as_pddl(
     Raises:
         InputError: a problem with rules of its own (groups), or one that is no finite list of facts of bearable length.
     """
-    if problem.rules is not None:
+    if problem.ground() is not problem.symbols:
         raise InputError(
             f"Expected a problem whose actions change fluents, to write it as PDDL; {problem.name!r} has rules of its "
             "own (groups of parts that leave together). Ask for single parts."

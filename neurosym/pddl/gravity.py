@@ -19,7 +19,7 @@ from neurosym.pddl.instances import Instance, least
 if TYPE_CHECKING:
     from neurosym.geometry.assembly import Assembly
     from neurosym.geometry.stability.falls import Fall
-    from neurosym.language.domain import Problem
+    from neurosym.language.problem import Problem
 
 #: Of one way to do an action: into so many operators its disjunctions are multiplied out, at the most. What is left
 #: over gets helper operators instead, which change nothing but a mark.

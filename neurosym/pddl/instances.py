@@ -17,7 +17,7 @@ from neurosym.pddl.facts import Fact, Mark
 from neurosym.pddl.table import ways_from_table
 
 if TYPE_CHECKING:
-    from neurosym.language.domain import Problem
+    from neurosym.language.problem import Problem
 
 T = TypeVar("T")
 

@@ -20,7 +20,7 @@ from neurosym.pddl.gravity import standing_asked, weighed
 from neurosym.pddl.instances import Instance, formulas_of, ground_instances, with_formulas, with_table
 
 if TYPE_CHECKING:
-    from neurosym.language.domain import Problem
+    from neurosym.language.problem import Problem
 
 
 def strips(problem: Problem, *, seconds: float | None = None, refuted: Sequence[Sequence[str]] = ()) -> Strips:

@@ -15,7 +15,7 @@ from neurosym.language.search_problem import Rejection
 from neurosym.language.terms import Atom, Derived, Literal
 
 if TYPE_CHECKING:
-    from neurosym.language.domain import Problem
+    from neurosym.language.problem import Problem
 
 #: More states than this are not written down.
 MAX_STATES = 20_000

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Any
 from neurosym.errors import InputError
 from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.contact.contacts import TABLE
-from neurosym.planning.explanation import GROUND, WhyNot
+from neurosym.geometry.step_motion import GROUND
+from neurosym.language.explanation import WhyNot
 
 if TYPE_CHECKING:
-    from neurosym.language.domain import Problem
+    from neurosym.language.problem import Problem
 
 
 @dataclass(frozen=True)
@@ -78,7 +79,7 @@ def inspect_problem(problem: Problem) -> Inspection:
         InputError: a problem of another kind.
     """
     world = problem.world
-    if not isinstance(world, Assembly) or problem.refute is None or problem.details.get("paths") != "straight":
+    if not isinstance(world, Assembly) or problem.details.get("paths") != "straight":
         raise InputError(f'Expected a problem of the domain "assembly" with paths="straight"; got {problem!r}.')
     graph = world.blocking(problem.details["directions"])
     everything = (1 << len(world)) - 1
@@ -87,7 +88,7 @@ def inspect_problem(problem: Problem) -> Inspection:
         for i, name in enumerate(world.names)
         if (directions := graph.free_directions(i, everything))
     }
-    why = problem.refute()
+    why = problem.semantics.refute(problem)
     standing = world.stability().standing_when_held(everything, problem.details["held"])
     stands = standing.stands or not problem.details["gravity"]
     return Inspection(

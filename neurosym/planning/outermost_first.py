@@ -14,7 +14,7 @@ from neurosym.planning.prior import OrderScores, Prior
 from neurosym.support.bitsets import bits
 
 if TYPE_CHECKING:
-    from neurosym.language.domain import Problem
+    from neurosym.language.problem import Problem
 
 
 class OutermostFirst(Prior):

@@ -14,7 +14,7 @@ from neurosym.geometry.step_motion import Way
 from neurosym.registry import load_domain
 
 if TYPE_CHECKING:
-    from neurosym.language.domain import Problem
+    from neurosym.language.problem import Problem
 
 #: Of the file. Raise it when a reader of the old one would go wrong.
 SCHEMA = 1

@@ -20,7 +20,7 @@ from neurosym.language.search_problem import Rejection, SearchProblem, Step
 from neurosym.planning.prior import OrderScores
 
 if TYPE_CHECKING:
-    from neurosym.planning.explanation import WhyNot
+    from neurosym.language.explanation import WhyNot
 
 S = TypeVar("S", bound=Hashable)
 

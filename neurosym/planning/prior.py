@@ -21,7 +21,7 @@ from scipy.optimize import linear_sum_assignment
 from neurosym.errors import InputError
 
 if TYPE_CHECKING:
-    from neurosym.language.domain import Problem
+    from neurosym.language.problem import Problem
 
 #: Least log-probability a score may have (nats). A prior that is sure still leaves every order a finite cost.
 LOG_FLOOR = -30.0

@@ -19,7 +19,7 @@ from neurosym.geometry.rigid_motions import Motion as Between
 from neurosym.geometry.step_motion import Way
 
 if TYPE_CHECKING:
-    from neurosym.language.domain import Problem
+    from neurosym.language.problem import Problem
 
 Array = NDArray[np.float64]
 
@@ -109,7 +109,7 @@ class Staging:
 def stage(problem: Problem, plan: Sequence[str], how: Sequence[Any] = ()) -> Staging:
     """The motions of a plan.
 
-    The problem says itself what its actions do to parts (`Problem.stage`), or a step's `Way` does, or the problem's
+    The problem says itself what its actions do to parts (`Semantics.staging`), or a step's `Way` does, or the problem's
     `Simulation`; failing these, the effects do: an action takes away the parts about which it only deletes atoms, and
     brings those about which it only adds some.
 
@@ -128,8 +128,9 @@ def stage(problem: Problem, plan: Sequence[str], how: Sequence[Any] = ()) -> Sta
     for name in plan:
         if name not in problem.actions:
             raise UnknownNameError("action", name, problem.actions)
-    if problem.stage is not None:
-        return problem.stage(plan, how)
+    staging = problem.semantics.staging(problem, plan, how)
+    if staging is not None:
+        return staging
     world = problem.world
     simulation = problem.simulation
     if simulation is None and isinstance(world, Assembly):
@@ -149,7 +150,7 @@ def _unclear(problem: Problem) -> InputError:
     return InputError(
         f"Expected a problem that says what its actions do to parts in space; {problem.name!r} does not. Give "
         "Domain.problem a world that is an Assembly and simulation=Simulation('rigid', removes={action: part}), or "
-        "a function as stage=."
+        "semantics= with a method staging."
     )
 
 

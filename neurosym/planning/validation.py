@@ -3,37 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from neurosym.errors import InputError, UnknownNameError
 from neurosym.language.search_problem import Rejection, SearchProblem
+from neurosym.language.semantics import Validation as Validation
 from neurosym.language.state import AtomSet
 from neurosym.language.terms import Derived, Literal
 
 if TYPE_CHECKING:
-    from neurosym.language.domain import Problem
-
-
-@dataclass(frozen=True)
-class Validation:
-    """What a replay found. Truthy exactly when the order is a plan.
-
-    Attributes:
-        ok: every action could be done, and the goal holds at the end.
-        failed_at: number of the first action (from 0) that could not; the order's length when all could but
-            the goal is missed; None when ok.
-        because: names of the objects that decided it.
-        reason: one sentence.
-    """
-
-    ok: bool
-    failed_at: int | None = None
-    because: tuple[str, ...] = ()
-    reason: str = "Every action can be done, and the goal is reached."
-
-    def __bool__(self) -> bool:
-        return self.ok
+    from neurosym.language.problem import Problem
 
 
 def validate(problem: Problem, order: Sequence[str], how: Sequence[Any] = ()) -> Validation:
@@ -60,8 +39,9 @@ def validate(problem: Problem, order: Sequence[str], how: Sequence[Any] = ()) ->
     for name in order:
         if not isinstance(name, str) or name not in ground:
             raise UnknownNameError("action primitive", name, ground)
-    if problem.rules is not None:
-        return problem.rules.replay(problem, order, how)
+    replayed = problem.semantics.replay(problem, order, how)
+    if replayed is not None:
+        return replayed
     world = problem.world.afresh() if hasattr(problem.world, "afresh") else problem.world
     state = AtomSet(set(problem.init), tuple(problem.type_of))
     done: list[str] = []

@@ -10,7 +10,7 @@ from collections import OrderedDict
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, field
 from types import TracebackType
-from typing import Literal, Protocol
+from typing import TYPE_CHECKING, Literal, Protocol
 
 import numpy as np
 
@@ -20,6 +20,9 @@ from neurosym.language.search_problem import Rejection, Step
 from neurosym.simulation.physics import MOVED_SHARE, SETTLE_STEPS, Physics, Snapshot
 from neurosym.simulation.world import World
 from neurosym.support.words import joined
+
+if TYPE_CHECKING:
+    from neurosym.language.problem import Problem
 
 #: The state of a problem under physics: the symbols, and the actions done so far, in order.
 PhysicsState = tuple[int, tuple[int, ...]]
@@ -116,6 +119,22 @@ class PhysicsOracle:
         kind: Literal["cubes", "parts"] = "cubes" if bodies == "cubes" else "parts"
         physics = physics or Physics(clearance=CUBES_CLEARANCE if bodies == "cubes" else 0.0)
         self._world = World(assembly, bodies=kind, physics=physics, present=present)
+
+    @classmethod
+    def of(cls, problem: Problem) -> PhysicsOracle:
+        """The oracle of a problem that says how physics would judge it.
+
+        Raises:
+            InputError: it does not.
+        """
+        rule = problem.simulation
+        if rule is None:
+            raise InputError(
+                f"Expected a problem that says how physics would judge it; {problem.name!r} does not "
+                "(for Soma: collapse='cubes' or 'rigid'). Use oracle='geometry'."
+            )
+        removes = [rule.removes[name] for name in problem.actions]
+        return cls(problem.symbols, problem.world, removes=removes, bodies=rule.bodies, absent=rule.absent)
 
     def close(self) -> None:
         """Close the simulator; closing twice does nothing. An oracle that is forgotten closes itself."""

@@ -31,7 +31,7 @@ from neurosym.simulation.world_window import WorldWindow
 
 if TYPE_CHECKING:
     from neurosym.geometry.assembly import Assembly
-    from neurosym.language.domain import Problem
+    from neurosym.language.problem import Problem
 
 #: A pulled part that ends farther than this from its path's end, in typical bodies, was jammed.
 JAMMED_SHARE = 0.5

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from neurosym.errors import ContractError
-from neurosym.language.domain import Problem
+from neurosym.language.problem import Problem
+from neurosym.language.problem_family import ProblemFamily
 from neurosym.language.search_problem import Rejection, SearchProblem, Step
-from neurosym.planning.problem_family import ProblemFamily
 from neurosym.planning.validation import replay, validate
 from neurosym.registry import load_domain
 
@@ -51,7 +51,7 @@ def check_domain(
     _require(len({p.name for p in test}) == len(test), "test problems of different names")
     for problem in problems if problems is not None else test[:3]:
         check_problem(problem, walks=walks, rng=rng)
-        if pictures and problem.observe is not None:
+        if pictures and problem.observation is not None:
             _check_pictures(problem)
     if facts:
         for name, (published, recompute) in family.known_facts().items():
@@ -150,9 +150,9 @@ def _check_pictures(problem: Problem) -> None:
     shape = None if views is None else views.shape
     fits = views is not None and views.dtype == np.uint8 and views.ndim == 4 and views.shape[-1] == 3
     _require(fits, "pictures as uint8 (V, H, W, 3)", f"{problem.name!r} gave {shape}")
-    assert problem.observe is not None
-    again = problem.observe()
-    _require(bool((again == views).all()), "the same seed to give the same pictures", f"{problem.name!r} did not")
+    again = problem.semantics.observe(problem)
+    same = again is not None and views is not None and np.array_equal(again, views)
+    _require(same, "the same seed to give the same pictures", f"{problem.name!r} did not")
 
 
 def _require(condition: bool, expected: str, came: str = "") -> None:

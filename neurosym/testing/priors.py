@@ -12,7 +12,7 @@ from neurosym.errors import ContractError
 from neurosym.planning.prior import OrderScores, Prior
 
 if TYPE_CHECKING:
-    from neurosym.language.domain import Problem
+    from neurosym.language.problem import Problem
 
 #: Largest difference in log-probability (nats) between one problem asked alone and in a batch: networks compute
 #: batches in another order of additions.

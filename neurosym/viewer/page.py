@@ -11,7 +11,7 @@ from collections.abc import Mapping
 import viser
 
 from neurosym.errors import InputError
-from neurosym.language.domain import Problem
+from neurosym.language.problem import Problem
 from neurosym.planning.staging import stage
 from neurosym.viewer import panels
 from neurosym.viewer.attempts import BECAUSE, MOST_REFUSALS, attempts, looked_at, most_refused

@@ -11,8 +11,8 @@ from functools import partial
 from typing import Any
 
 from neurosym.errors import InputError, UnknownNameError
-from neurosym.language.domain import Problem
 from neurosym.language.options import check_options
+from neurosym.language.problem import Problem
 from neurosym.pipeline import ORACLES, advice, solve
 from neurosym.planning.planner import Budget, SearchLog
 from neurosym.registry import load_domain, planner_names, prior_names

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from neurosym.errors import InputError, NeurosymError
-from neurosym.language.domain import Problem
+from neurosym.language.problem import Problem
 from neurosym.language.search_problem import Step
 from neurosym.pipeline import advice
 from neurosym.planning.planner import PlanResult, Refusal, Status

@@ -12,7 +12,7 @@ from neurosym.errors import InputError
 from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.blocking.directions import Directions
 from neurosym.geometry.contact.contacts import TABLE
-from neurosym.planning.explanation import GROUND
+from neurosym.geometry.step_motion import GROUND
 from neurosym.support.files import write_text
 
 #: Of the JSON file. Raise it when a reader of the old one would go wrong.

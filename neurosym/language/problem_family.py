@@ -9,15 +9,18 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from neurosym.language.semantics import Semantics
+
 if TYPE_CHECKING:
-    from neurosym.language.domain import Domain, Problem
-    from neurosym.planning.demonstrations import Demonstrations
+    from neurosym.language.demonstrations import Demonstrations
+    from neurosym.language.domain import Domain
+    from neurosym.language.problem import Problem
 
 #: Called with (done, total) while long work goes on.
 Progress = Callable[[int, int], None]
 
 
-class ProblemFamily(ABC):
+class ProblemFamily(Semantics, ABC):
     """What an entry point in ``neurosym.domains`` names.
 
     Attributes:

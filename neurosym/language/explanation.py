@@ -11,13 +11,9 @@ from typing import Any
 
 from neurosym.geometry.blocking.directions import in_words
 from neurosym.geometry.blocking.graph import BlockingGraph
-from neurosym.geometry.step_motion import GROUND as GROUND
-from neurosym.geometry.step_motion import Vector
+from neurosym.geometry.step_motion import GROUND, Vector
 from neurosym.support.bitsets import bits
-from neurosym.support.words import joined
-
-#: Names, or sentences of one kind, beyond this many are counted, not listed; the data has them all.
-LISTED = 8
+from neurosym.support.words import LISTED, listed
 
 
 @dataclass(frozen=True)
@@ -176,13 +172,6 @@ def _shortest(along: Sequence[int], there: int, below: int) -> tuple[int, ...]:
                     following.append(j)
             layer, length = following, length + 1
     return best
-
-
-def listed(names: Sequence[str]) -> str:
-    """'a, b and c'; many names are cut short."""
-    if len(names) > LISTED:
-        return f"{', '.join(names[: LISTED - 1])} and {len(names) - LISTED + 1} more"
-    return joined(names)
 
 
 def _fall(fall: Fall) -> str:

@@ -1,0 +1,207 @@
+"""Problems: a domain, a world, and what holds at first and at last. Data; `Domain.problem` makes it."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+from typing import Literal as OneOf
+
+import networkx as nx
+import numpy as np
+from numpy.typing import NDArray
+
+from neurosym.errors import DefinitionError, InputError, UnknownNameError
+from neurosym.language.actions import Action
+from neurosym.language.semantics import Semantics
+from neurosym.language.terms import Atom, Derived, Literal, Type, Variable
+
+if TYPE_CHECKING:
+    from neurosym.language.domain import Domain
+    from neurosym.language.grounding import GroundProblem
+    from neurosym.language.search_problem import SearchProblem
+
+#: More ground actions than this are refused: the definition wants a static fluent that narrows its parameters.
+MAX_GROUND_ACTIONS = 1_000_000
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """How a physics simulation would judge a problem: what moves as one body, and what each action removes.
+
+    Attributes:
+        bodies: ``"cubes"`` (every unit cube by itself, the paper's rule) or ``"rigid"`` (every part one body).
+        removes: name of an action -> name of the part that it takes away.
+        absent: parts of the world that are gone when the problem begins.
+    """
+
+    bodies: OneOf["cubes", "rigid"]
+    removes: Mapping[str, str]
+    absent: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """A problem: a domain, a world, and what holds at first and at last. Made by `Domain.problem`."""
+
+    domain: Domain
+    world: Any
+    objects: Mapping[Type, tuple[str, ...]]
+    init: tuple[Atom, ...]
+    goal: tuple[Literal, ...]
+    before: tuple[tuple[str, str], ...] = ()
+    interchangeable: tuple[tuple[str, ...], ...] = ()
+    name: str = ""
+    family: str | None = None
+    details: Mapping[str, Any] = field(default_factory=dict)
+    simulation: Simulation | None = None
+    semantics: Semantics = field(default_factory=Semantics)
+    pictures: NDArray[np.uint8] | None = None
+
+    def __post_init__(self) -> None:
+        place = f"problem {self.name!r} of domain {self.domain.name!r}"
+        seen: dict[str, Type] = {}
+        for kind, names in self.objects.items():
+            if not isinstance(kind, Type):
+                raise DefinitionError(f"In {place}, objects: expected a Type as key; got {kind!r}.")
+            for name in names:
+                if not isinstance(name, str) or not name:
+                    raise DefinitionError(f"In {place}, objects of {kind}: expected names; got {name!r}.")
+                if name in seen:
+                    raise DefinitionError(f"In {place}, objects: expected each name once; {name!r} comes twice.")
+                seen[name] = kind
+        for i, atom in enumerate(self.init):
+            if not isinstance(atom, Atom) or isinstance(atom.predicate, Derived):
+                raise DefinitionError(f"In {place}, init[{i}]: expected a fluent of objects; got {atom!s}.")
+            self._check_atom(atom, f"{place}, init[{i}]")
+        for i, literal in enumerate(self.goal):
+            self._check_atom(literal.atom, f"{place}, goal[{i}]")
+        for action in self.domain.actions:
+            for where, literals in (("pre", action.pre), ("eff", action.eff)):
+                for i, literal in enumerate(literals):
+                    constants = [a for a in literal.atom.args if isinstance(a, str)]
+                    if constants:
+                        self._check_args(literal.atom, f"{place}, action {action.name!r}, {where}[{i}]")
+
+    def _check_atom(self, atom: Atom, place: str) -> None:
+        if not isinstance(atom.predicate, Derived) and atom.predicate not in self.domain.fluents:
+            known = ", ".join(f.name for f in self.domain.fluents)
+            raise DefinitionError(f"In {place}: the fluent {atom.predicate} is not the domain's; expected {known}.")
+        if any(isinstance(a, Variable) for a in atom.args):
+            raise DefinitionError(f"In {place}: expected names of objects; got the variable in {atom}.")
+        self._check_args(atom, place)
+
+    def _check_args(self, atom: Atom, place: str) -> None:
+        for arg, kind in zip(atom.args, atom.predicate.types):
+            if isinstance(arg, Variable):
+                continue
+            actual = self.type_of.get(arg)
+            if actual is None:
+                known = UnknownNameError("object", arg, self.type_of)
+                raise DefinitionError(f"In {place}: {atom}: unknown object. {known}")
+            if not actual.is_a(kind):
+                raise DefinitionError(f"In {place}: {atom}: expected a {kind}; {arg!r} is a {actual}.")
+
+    @cached_property
+    def type_of(self) -> dict[str, Type]:
+        """Object -> its type."""
+        return {name: kind for kind, names in self.objects.items() for name in names}
+
+    def objects_of(self, kind: Type) -> tuple[str, ...]:
+        """Names of the objects of a type or of a type below it, in the problem's order."""
+        return tuple(name for name, actual in self.type_of.items() if actual.is_a(kind))
+
+    def bindings(self, action: Action) -> Iterable[dict[str, str]]:
+        """Every type-consistent way to fill an action's parameters."""
+        domains = [self.objects_of(p.type) for p in action.params]
+        count = int(np.prod([len(d) for d in domains], dtype=np.float64)) if domains else 1
+        if count > MAX_GROUND_ACTIONS:
+            raise DefinitionError(
+                f"In problem {self.name!r}, action {action.name!r}: {count:,} ways to fill its parameters, more than "
+                f"{MAX_GROUND_ACTIONS:,}. Give them narrower types."
+            )
+        names = [p.name for p in action.params]
+        return (dict(zip(names, objects)) for objects in itertools.product(*domains))
+
+    @cached_property
+    def symbols(self) -> GroundProblem:
+        """The symbols as bitsets. Done once."""
+        from neurosym.language.grounding import GroundProblem
+
+        return GroundProblem(self)
+
+    @cached_property
+    def _search_problem(self) -> SearchProblem[Any]:
+        return self.semantics.search(self)
+
+    def ground(self) -> SearchProblem[Any]:
+        """The problem as planners see it. Done once."""
+        return self._search_problem
+
+    @property
+    def actions(self) -> tuple[str, ...]:
+        """Names of the action primitives, in the order in which priors score them."""
+        return self.symbols.actions
+
+    @property
+    def classes(self) -> tuple[int, ...]:
+        """One integer an action primitive; equal ones are interchangeable."""
+        return self.symbols.classes
+
+    @cached_property
+    def observation(self) -> NDArray[np.uint8] | None:
+        """The pictures, uint8 (V, H, W, 3), taken when first asked for; None when there are none."""
+        return self.semantics.observe(self) if self.pictures is None else self.pictures
+
+    def with_pictures(self, pictures: NDArray[np.uint8]) -> Problem:
+        """The same problem behind other pictures."""
+        array = np.asarray(pictures)
+        if array.dtype != np.uint8 or array.ndim != 4 or array.shape[-1] != 3:
+            raise InputError(f"Expected pictures as uint8 (V, H, W, 3); got {array.dtype} of shape {array.shape}.")
+        return dataclasses.replace(self, pictures=array)
+
+    def __repr__(self) -> str:
+        return f"Problem({self.name!r}, {len(self.type_of)} objects, {len(self.actions)} actions)"
+
+
+def as_names(given: Any, what: str) -> tuple[str, ...]:
+    """A collection of names, checked; one text is no collection of names, though it is one of letters."""
+    if isinstance(given, str) or not isinstance(given, Iterable):
+        raise InputError(f"Expected {what} as a list of names; got {given!r}.")
+    names = tuple(given)
+    strange = [n for n in names if not isinstance(n, str)]
+    if strange:
+        raise InputError(f"Expected {what} as a list of names; got {strange[0]!r} in it.")
+    return names
+
+
+def checked_pairs(given: Any, place: str) -> tuple[tuple[str, str], ...]:
+    advice = f"In {place}, before: expected pairs of names of actions, for instance [('a', 'b')]"
+    if isinstance(given, str | Mapping) or not isinstance(given, Iterable):
+        raise DefinitionError(f"{advice}; got {given!r}.")
+    pairs = []
+    for pair in given:
+        if isinstance(pair, str) or not isinstance(pair, Sequence) or len(pair) != 2:
+            raise DefinitionError(f"{advice}; got {pair!r} in it.")
+        pairs.append((pair[0], pair[1]))
+    return tuple(pairs)
+
+
+def check_precedence(before: Sequence[tuple[str, str]], names: Iterable[str], place: str) -> None:
+    """Refuse precedence over unknown actions, and precedence in a circle (which is named)."""
+    known = set(names)
+    graph = nx.DiGraph()
+    for i, (a, b) in enumerate(before):
+        for action in (a, b):
+            if action not in known:
+                raise DefinitionError(f"In {place}, before[{i}]: {UnknownNameError('action', action, known)}")
+        graph.add_edge(a, b)
+    try:
+        cycle = nx.find_cycle(graph)
+    except nx.NetworkXNoCycle:
+        return
+    circle = " before ".join([a for a, _ in cycle] + [cycle[0][0]])
+    raise DefinitionError(f"In {place}: precedence in a circle, so no order can obey it: {circle}.")
