@@ -1,4 +1,4 @@
-"""The order of the house: rooms import downwards (import-linter), and no module needs, at run time, one that needs it."""
+"""The house: no module needs, at run time, one that needs it. That rooms import downwards is a contract."""
 
 import ast
 from pathlib import Path

@@ -15,9 +15,10 @@ import sys
 import tempfile
 import threading
 import weakref
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
-from types import ModuleType, TracebackType
-from typing import IO, Any, cast
+from types import ModuleType
+from typing import IO, Any, Self, cast
 
 from neurosym.errors import MissingDependencyError, NeurosymError
 
@@ -92,7 +93,20 @@ def pybullet() -> Any:
         return _module
 
 
-class Client:
+class Closeable(ABC):
+    """What is closed when its ``with`` ends; closing twice does nothing."""
+
+    @abstractmethod
+    def close(self) -> None: ...
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+class Client(Closeable):
     """One connection to a simulator of its own, without a window (`neurosym.simulation.window` has one).
 
     Use it as a context manager, or call `close`. Attribute `p` is the `pybullet` module and `id` what its
@@ -120,14 +134,6 @@ class Client:
     def close(self) -> None:
         """Disconnect; closing twice does nothing."""
         self._finalizer()
-
-    def __enter__(self) -> Client:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
 
 def open_clients() -> int:

@@ -10,14 +10,14 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Collection, Mapping
 from pathlib import Path
-from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from neurosym.errors import InputError
-from neurosym.simulation.client import Client
+from neurosym.simulation.client import Client, Closeable
+from neurosym.simulation.drawing import drawn, flat_shaded
 from neurosym.simulation.looks import Camera, aimed
 from neurosym.simulation.scene import RGB
 from neurosym.simulation.shading import LIGHT, Single, cast, ink, set_off
@@ -41,7 +41,7 @@ _FINER = 8
 _AWAY = 1e3
 
 
-class FilmSet:
+class FilmSet(Closeable):
     """Parts, ground, light and one camera that does not move (a context manager).
 
     Args:
@@ -89,14 +89,6 @@ class FilmSet:
     def close(self) -> None:
         """Close the renderer; closing twice does nothing."""
         self._client.close()
-
-    def __enter__(self) -> FilmSet:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def picture(
         self, shown: Collection[str], where: Mapping[str, Array] | None = None, *, marked: Collection[str] = ()
@@ -178,22 +170,17 @@ class FilmSet:
     def _drawn(self) -> tuple[Picture, Single, NDArray[np.int32]]:
         """The large picture: colours (height, width, 3), distances and numbers of parts, -1: none, (height, width)."""
         width, height = (n * OVERSAMPLING for n in self.size)
-        _, _, rgba, depth, parts = self._p.getCameraImage(
-            width,
-            height,
+        colour, depth, parts = drawn(
+            self._client,
+            (width, height),
             self._view.T.ravel().tolist(),
             self._projection.T.ravel().tolist(),
-            lightDirection=(10 * LIGHT).tolist(),
-            lightColor=(1, 1, 1),
-            lightDistance=20,
+            light=(10 * LIGHT).tolist(),
+            distance=20,
+            shades=(0.62, 0.42, 0.0),
             shadow=0,
-            lightAmbientCoeff=0.62,
-            lightDiffuseCoeff=0.42,
-            lightSpecularCoeff=0.0,
-            renderer=self._p.ER_TINY_RENDERER,
-            physicsClientId=self._client.id,
         )
-        colour = np.array(rgba, dtype=np.uint8).reshape(height, width, 4)[:, :, :3].copy()
+        colour = colour.copy()
         near, far = self._planes
         distance = far * near / (far - (far - near) * np.asarray(depth, dtype=np.float32).reshape(height, width))
         owner = np.array(parts, dtype=np.int32).reshape(height, width)
@@ -232,17 +219,6 @@ class FilmSet:
         return number
 
     def _visual(self, triangles: Array, rgba: list[float], **options: Any) -> int:
-        # Corners are not shared between triangles: each face keeps its own normal, and edges stay sharp.
-        normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)
-        return int(
-            self._p.createVisualShape(
-                self._p.GEOM_MESH,
-                vertices=triangles.reshape(-1, 3).tolist(),
-                indices=list(range(3 * len(triangles))),
-                normals=np.repeat(normals, 3, axis=0).tolist(),
-                rgbaColor=rgba,
-                physicsClientId=self._client.id,
-                **options,
-            )
-        )
+        options |= flat_shaded(triangles)
+        c = self._client.id
+        return int(self._p.createVisualShape(self._p.GEOM_MESH, rgbaColor=rgba, physicsClientId=c, **options))

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections import OrderedDict
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, field
-from types import TracebackType
 from typing import TYPE_CHECKING, Literal, Protocol
 
 import numpy as np
@@ -17,6 +16,7 @@ import numpy as np
 from neurosym.errors import InputError
 from neurosym.geometry.assembly import Assembly
 from neurosym.language.search_problem import Rejection, Step
+from neurosym.simulation.client import Closeable
 from neurosym.simulation.physics import MOVED_SHARE, SETTLE_STEPS, Physics, Snapshot
 from neurosym.simulation.world import World
 from neurosym.support.words import joined
@@ -67,7 +67,7 @@ class _Accepted:
     poses: Snapshot = field(default_factory=Snapshot)
 
 
-class PhysicsOracle:
+class PhysicsOracle(Closeable):
     """A `SearchProblem` whose attempts are answered by simulation (a context manager).
 
     Two rules:
@@ -139,14 +139,6 @@ class PhysicsOracle:
     def close(self) -> None:
         """Close the simulator; closing twice does nothing. An oracle that is forgotten closes itself."""
         self._world.close()
-
-    def __enter__(self) -> PhysicsOracle:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     # -- what planners use ------------------------------------------------------------------------------------
 

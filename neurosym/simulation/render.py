@@ -7,7 +7,6 @@ nothing collides here: bodies are visual shapes at poses.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from types import TracebackType
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,8 @@ from numpy.typing import NDArray
 
 from neurosym.errors import InputError
 from neurosym.geometry.assembly import Assembly
-from neurosym.simulation.client import Client
+from neurosym.simulation.client import Client, Closeable
+from neurosym.simulation.drawing import drawn, flat_shaded
 from neurosym.simulation.looks import VIEWS, Camera, Style, draw_look, style_named
 from neurosym.simulation.scene import RGB, Scene, scene_of
 
@@ -31,7 +31,7 @@ CHUNK = 48
 _SQUARE = (np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]), np.array([[0, 1, 2], [0, 2, 3]]))
 
 
-class PictureStudio:
+class PictureStudio(Closeable):
     """Cameras and a renderer, kept ready: pictures of assemblies with the same shapes only move bodies about.
 
     A context manager. The pictures do not depend on what was drawn before.
@@ -46,14 +46,6 @@ class PictureStudio:
     def close(self) -> None:
         """Close the renderer; closing twice does nothing."""
         self._client.close()
-
-    def __enter__(self) -> PictureStudio:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def views(
         self,
@@ -93,24 +85,17 @@ class PictureStudio:
         self._arrange(scene, look.colours)
         pictures = np.empty((len(cameras), size, size, 3), dtype=np.uint8)
         for i, camera in enumerate(look.cameras):
-            rgba = self._p.getCameraImage(
-                size,
-                size,
+            pictures[i], _, _ = drawn(
+                self._client,
+                (size, size),
                 camera.view_matrix(),
                 camera.projection_matrix(),
-                lightDirection=look.light,
-                lightColor=(1, 1, 1),
-                lightDistance=10,
+                light=look.light,
+                distance=10,
+                shades=(look.ambient, look.diffuse, look.specular),
                 shadow=int(look.shadow),
-                lightAmbientCoeff=look.ambient,
-                lightDiffuseCoeff=look.diffuse,
-                lightSpecularCoeff=look.specular,
-                renderer=self._p.ER_TINY_RENDERER,
                 flags=self._p.ER_NO_SEGMENTATION_MASK,
-                physicsClientId=self._client.id,
-            )[2]
-            # A PyBullet built without numpy hands out a flat tuple.
-            pictures[i] = np.asarray(rgba, dtype=np.uint8).reshape(size, size, 4)[:, :, :3]
+            )
         if look.noise > 0:
             noise = chance.standard_normal(pictures.shape, dtype=np.float32) * np.float32(look.noise)
             pictures = np.clip(np.rint(pictures + noise), 0, 255).astype(np.uint8)
@@ -136,19 +121,8 @@ class PictureStudio:
     def _visual(self, scene: Scene, i: int) -> int:
         p, c = self._p, self._client.id
         vertices, faces = scene.meshes.get(i, _SQUARE)
-        # Corners are not shared between triangles: each face keeps its own normal, and edges stay sharp.
-        triangles = (vertices * scene.half[i])[faces]
-        normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)
-        return int(
-            p.createVisualShape(
-                p.GEOM_MESH,
-                vertices=triangles.reshape(-1, 3).tolist(),
-                indices=list(range(3 * len(faces))),
-                normals=np.repeat(normals, 3, axis=0).tolist(),
-                physicsClientId=c,
-            )
-        )
+        surface = flat_shaded((vertices * scene.half[i])[faces])
+        return int(p.createVisualShape(p.GEOM_MESH, **surface, physicsClientId=c))
 
 
 def render_views(

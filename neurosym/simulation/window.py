@@ -12,16 +12,17 @@ import select
 import subprocess
 import sys
 import time
+from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from types import TracebackType
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from neurosym.errors import NeurosymError
+from neurosym.simulation.client import Closeable
 from neurosym.simulation.looks import Camera, aimed
 from neurosym.simulation.shading import LIGHT
 
@@ -54,7 +55,7 @@ class Shown:
     mesh: tuple[str, tuple[float, ...], tuple[float, ...]] | None = None
 
 
-class Window:
+class Window(Closeable):
     """A window, until it is closed from either side (a context manager).
 
     Args:
@@ -122,11 +123,6 @@ class Window:
         elif ahead < -_BEHIND:
             self._start -= ahead
 
-    def linger(self, poses: Callable[[], Array]) -> None:
-        """Show the end for a moment."""
-        for _ in range(round(LINGER * RATE)):
-            self.advance(1 / RATE, poses)
-
     def close(self) -> None:
         """Close it; closing twice does nothing."""
         for stream in (self._process.stdin, self._process.stdout):
@@ -138,14 +134,6 @@ class Window:
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
-
-    def __enter__(self) -> Window:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def _send(self, data: bytes) -> bool:
         assert self._process.stdin is not None
@@ -160,6 +148,30 @@ class Window:
         """Whether the window says, within so long, that it has shown what it was sent last."""
         out: Any = self._process.stdout
         return bool(select.select([out], [], [], seconds)[0]) and bool(os.read(out.fileno(), 1))
+
+
+class Spectator(Closeable):
+    """A window on something that moves by itself; where all went well it shows the end for a moment."""
+
+    _window: Window
+
+    @abstractmethod
+    def _poses(self) -> Array:
+        """float64 (n_bodies, 7), as `Window.advance` takes them."""
+
+    @property
+    def is_open(self) -> bool:
+        """Whether the window is still there."""
+        return self._window.is_open
+
+    def close(self) -> None:
+        self._window.close()
+
+    def __exit__(self, *error: object) -> None:
+        if not any(error):
+            for _ in range(round(LINGER * RATE)):
+                self._window.advance(1 / RATE, self._poses)
+        self.close()
 
 
 def _started() -> subprocess.Popen[bytes]:

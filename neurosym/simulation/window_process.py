@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from neurosym.simulation.client import pybullet
+from neurosym.simulation.drawing import flat_shaded
 
 #: Where bodies that are not there wait, and how large the table is, in scene units.
 _AWAY, _TABLE = -1e4, 200.0
@@ -64,14 +65,7 @@ def _body(p: Any, body: dict[str, Any]) -> int:
         name, position, turn = body["mesh"]
         look |= {"fileName": name, "visualFramePosition": position, "visualFrameOrientation": turn}
     else:
-        triangles = np.array(body["triangles"])
-        normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)
-        look |= {
-            "vertices": triangles.reshape(-1, 3).tolist(),
-            "indices": list(range(3 * len(triangles))),
-            "normals": np.repeat(normals, 3, axis=0).tolist(),
-        }
+        look |= flat_shaded(np.array(body["triangles"]))
     shape = p.createVisualShape(p.GEOM_MESH, **look)
     return int(p.createMultiBody(0, -1, shape, (0, 0, _AWAY)))
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
 from math import sqrt
-from types import TracebackType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,7 +15,7 @@ from numpy.typing import NDArray
 
 from neurosym.errors import InputError, UnknownNameError
 from neurosym.simulation.bodies import Bodies, resting_frame
-from neurosym.simulation.client import Client
+from neurosym.simulation.client import Client, Closeable
 from neurosym.simulation.physics import MOVED_SHARE, REST, SETTLE_STEPS, BodyKey, Physics, Snapshot
 from neurosym.simulation.solids import BodiesKind, MeshesKind, RigidBody, matrix, rigid_bodies, typical_extent
 
@@ -26,7 +25,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-class World:
+class World(Closeable):
     """An assembly on its table, in a simulator of its own (a context manager).
 
     Args:
@@ -83,14 +82,6 @@ class World:
     def close(self) -> None:
         """Close the simulator; closing twice does nothing."""
         self._client.close()
-
-    def __enter__(self) -> World:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     @property
     def bodies(self) -> tuple[BodyKey, ...]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from types import TracebackType
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
@@ -12,13 +10,13 @@ from neurosym.planning.staging import Staging
 from neurosym.simulation.scene import part_colours
 from neurosym.simulation.solids import RigidBody, Solid
 from neurosym.simulation.storyboard import best_camera, room_for
-from neurosym.simulation.window import HIDDEN, Shown, Window
+from neurosym.simulation.window import HIDDEN, Shown, Spectator, Window
 from neurosym.simulation.world import World
 
 Array = NDArray[np.float64]
 
 
-class WorldWindow:
+class WorldWindow(Spectator):
     """Shows a world as its time passes (a context manager).
 
     Args:
@@ -39,25 +37,6 @@ class WorldWindow:
     def tick(self) -> None:
         """One time step of the world has passed."""
         self._window.advance(self._world.physics.time_step, self._poses)
-
-    @property
-    def is_open(self) -> bool:
-        """Whether it is still there."""
-        return self._window.is_open
-
-    def close(self) -> None:
-        """Close it; closing twice does nothing."""
-        self._window.close()
-
-    def __enter__(self) -> WorldWindow:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        if kind is None:
-            self._window.linger(self._poses)
-        self._window.close()
 
     def _poses(self) -> Array:
         frames = self._world.poses().frames

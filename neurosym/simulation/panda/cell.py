@@ -7,13 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
-from types import TracebackType
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from neurosym.simulation.client import Client
+from neurosym.simulation.client import Client, Closeable
 from neurosym.simulation.panda.arm import PandaArm
 from neurosym.simulation.scene import RGB
 from neurosym.simulation.solids import matrix, quaternion
@@ -41,7 +40,7 @@ class Load:
     X_TB: Array
 
 
-class Cell:
+class Cell(Closeable):
     """Table, blocks and arm (a context manager).
 
     Args:
@@ -107,14 +106,6 @@ class Cell:
     def close(self) -> None:
         """Close the simulator; closing twice does nothing."""
         self.client.close()
-
-    def __enter__(self) -> Cell:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def pose(self, block: str) -> Array:
         """float64 (4, 4): where a block lies now."""

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from types import TracebackType
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
+from neurosym.simulation.drawing import drawn
 from neurosym.simulation.film_files import RATE
 from neurosym.simulation.looks import Camera, aimed
 from neurosym.simulation.panda.cell import TIME_STEP, Cell
 from neurosym.simulation.shading import LIGHT
-from neurosym.simulation.window import Shown, Window
+from neurosym.simulation.window import Shown, Spectator, Window
 
 Array = NDArray[np.float64]
 Picture = NDArray[np.uint8]
@@ -26,7 +24,7 @@ ROOM = np.array(np.meshgrid(*zip(_LOW, _HIGH))).reshape(3, -1).T
 _OVERSAMPLING = 2
 
 
-class CellWindow:
+class CellWindow(Spectator):
     """Shows a cell in a window, in real time (a context manager).
 
     Raises:
@@ -43,16 +41,6 @@ class CellWindow:
     def tick(self, cell: Cell) -> None:
         """One time step has passed."""
         self._window.advance(TIME_STEP, self._poses)
-
-    def __enter__(self) -> CellWindow:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        if kind is None:
-            self._window.linger(self._poses)
-        self._window.close()
 
     def _poses(self) -> Array:
         return np.array([*(self._cell.arm.frame(link) for link in self._links), *self._cell.frames().values()])
@@ -83,25 +71,15 @@ def picture_of(cell: Cell, size: tuple[int, int]) -> Picture:
     """uint8 (height, width, 3): the cell as it is now, from `CAMERA`, without a window."""
     from PIL import Image
 
-    p: Any = cell.client.p
     large = (_OVERSAMPLING * size[0], _OVERSAMPLING * size[1])
     view, projection, _ = aimed(ROOM, CAMERA, size)
-    image = p.getCameraImage(
-        *large,
-        view.T.ravel().tolist(),
-        projection.T.ravel().tolist(),
-        lightDirection=(10 * LIGHT).tolist(),
-        lightColor=(1, 1, 1),
-        lightDistance=3,
-        shadow=0,
-        lightAmbientCoeff=0.6,
-        lightDiffuseCoeff=0.42,
-        lightSpecularCoeff=0.0,
-        renderer=p.ER_TINY_RENDERER,
-        physicsClientId=cell.client.id,
+    matrices = view.T.ravel().tolist(), projection.T.ravel().tolist()
+    light = (10 * LIGHT).tolist()
+    colour, _, owners = drawn(
+        cell.client, large, *matrices, light=light, distance=3, shades=(0.6, 0.42, 0.0), shadow=0
     )
-    colour = np.array(image[2], dtype=np.uint8).reshape(large[1], large[0], 4)[:, :, :3].copy()
-    colour[np.array(image[4]).reshape(large[1], large[0]) < 0] = 255
+    colour = colour.copy()
+    colour[np.array(owners).reshape(large[1], large[0]) < 0] = 255
     return np.asarray(Image.fromarray(colour).reduce(_OVERSAMPLING))
 
 
