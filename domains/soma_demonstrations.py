@@ -8,11 +8,9 @@
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 import os
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,7 +23,7 @@ from neurosym.language.demonstrations import Demonstrations
 from neurosym.language.problem_family import Progress
 from neurosym.language.search_problem import Step
 from neurosym.registry import load_planner
-from neurosym.support.files import replacing
+from neurosym.support.disk_cache import cache_folder, load, store
 
 if TYPE_CHECKING:
     from domains.soma import SomaFamily
@@ -119,14 +117,14 @@ def _labels(
     family: SomaFamily, cells: Mapping[str, tuple[Cell, ...]]
 ) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
     """For a cube in its 48 poses: the demonstrator's orders, int64 (48, 7), and the shares, float32 (48, 7, 7)."""
-    from neurosym.simulation.picture_cache import cache_folder
-
     key = hashlib.sha256(repr((LABELS_VERSION, sorted(cells.items()))).encode()).hexdigest()
-    path = cache_folder() / "soma-labels" / f"{key}.npz"
-    with contextlib.suppress(Exception), np.load(path, allow_pickle=False) as file:
-        return file["orders"], file["shares"]
-    orders, shares = _count_labels(family, dict(cells))
-    _keep(path, orders, shares)
+    folder = cache_folder() / "soma-labels"
+    orders, shares = np.zeros((48, 7), dtype=np.int64), np.zeros((48, 7, 7), dtype=np.float32)
+    paths = folder / f"{key}-orders.z", folder / f"{key}-shares.z"
+    if not (load(paths[0], orders) and load(paths[1], shares)):
+        orders, shares = _count_labels(family, dict(cells))
+        store(paths[0], orders)
+        store(paths[1], shares)
     return orders, shares
 
 
@@ -150,9 +148,3 @@ def _count_labels(
         orders[pose] = [swap[a] for a in order] if mirrored else order
         shares[pose] = share[:, swap] if mirrored else share
     return orders, shares
-
-
-def _keep(path: Path, orders: NDArray[np.int64], shares: NDArray[np.float32]) -> None:
-    """Write aside, then rename; a folder that cannot be written to costs speed, no more."""
-    with contextlib.suppress(OSError), replacing(path) as temporary:
-        np.savez_compressed(temporary, orders=orders, shares=shares)

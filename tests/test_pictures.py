@@ -13,8 +13,8 @@ import pytest
 from neurosym.errors import InputError, UnknownNameError
 from neurosym.geometry.assembly import Assembly, Body, Mesh, Part
 from neurosym.simulation import PALETTE, PictureStudio, cached_pictures, open_clients, render_many, render_views
-from neurosym.simulation.picture_cache import cache_folder
 from neurosym.simulation.render import CHUNK
+from neurosym.support.disk_cache import cache_folder
 
 CELLS = {
     "corner": [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)],

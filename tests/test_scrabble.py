@@ -289,7 +289,7 @@ def test_pictures_do_not_depend_on_workers_and_come_from_disk(monkeypatch, tmp_p
     together = cached_pictures(jobs, style="hard", workers=2, folder=tmp_path / "two")
     assert (alone == together).all()
     assert (alone[7] == draw_word(jobs[7][0], STYLES["hard"], np.random.default_rng(7))).all()
-    files = sorted((tmp_path / "one").rglob("*.raw"))
+    files = sorted((tmp_path / "one").rglob("*.z"))
     assert len(files) == 3
     damaged = bytearray(files[0].read_bytes())
     damaged[100] ^= 1

@@ -365,7 +365,7 @@ def test_labels_hold_in_every_pose(monkeypatch, tmp_path):
     again = _labels(soma, cells)
     assert (again[0] == orders_).all()
     assert (again[1] == shares).all()
-    next(tmp_path.rglob("*.npz")).write_bytes(b"damaged")
+    next(tmp_path.rglob("*-shares.z")).write_bytes(b"damaged")
     assert (_labels(soma, cells)[0] == orders_).all()
 
 
