@@ -14,9 +14,9 @@ if TYPE_CHECKING:
     from learned_priors.encoders import encoder_names as encoder_names
     from learned_priors.encoders import register_encoder as register_encoder
     from learned_priors.network_prior import NetworkPrior as NetworkPrior
-    from learned_priors.recipes import TrainConfig as TrainConfig
     from learned_priors.sinkhorn import gumbel_sinkhorn as gumbel_sinkhorn
     from learned_priors.sinkhorn import log_sinkhorn as log_sinkhorn
+    from learned_priors.train_config import TrainConfig as TrainConfig
     from learned_priors.training import FitProgress as FitProgress
 
 _HOME = {
@@ -24,7 +24,7 @@ _HOME = {
     "encoder_names": "encoders",
     "register_encoder": "encoders",
     "NetworkPrior": "network_prior",
-    "TrainConfig": "recipes",
+    "TrainConfig": "train_config",
     "gumbel_sinkhorn": "sinkhorn",
     "log_sinkhorn": "sinkhorn",
     "FitProgress": "training",

@@ -15,7 +15,7 @@ from torch import Tensor
 from learned_priors.losses import cross_entropy, loss_of, targets_of
 from learned_priors.metrics import whole_order_accuracy
 from learned_priors.networks import Logits, NetworkConfig, OrderNetwork
-from learned_priors.recipes import TrainConfig
+from learned_priors.train_config import TrainConfig
 from neurosym.errors import InputError
 from neurosym.language.demonstrations import Demonstrations
 

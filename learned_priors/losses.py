@@ -9,8 +9,8 @@ from torch import Tensor
 from torch.nn import functional
 
 from learned_priors.networks import Logits
-from learned_priors.recipes import TrainConfig
 from learned_priors.sinkhorn import gumbel_sinkhorn, log_sinkhorn
+from learned_priors.train_config import TrainConfig
 
 
 def targets_of(sequences: Tensor, n_actions: int, marginals: Tensor | None = None) -> Tensor:

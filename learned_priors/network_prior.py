@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self, overload
 
@@ -11,28 +11,20 @@ import numpy as np
 import torch
 from numpy.typing import ArrayLike, NDArray
 
-from learned_priors import bundled
-from learned_priors.checkpoints import load_network, save_network
+from learned_priors.checkpoints import save_network
 from learned_priors.learner import CHUNK
 from learned_priors.metrics import decoded
-from learned_priors.networks import Logits, NetworkConfig, OrderNetwork
-from learned_priors.recipes import RECIPES, Recipe, TrainConfig, recipe_named
+from learned_priors.networks import Logits
+from learned_priors.recipes import Recipe, recipe_named
+from learned_priors.train_config import TrainConfig
 from learned_priors.training import FitProgress, fit
-from neurosym.errors import CheckpointError, InputError
+from learned_priors.weight_store import Weights, WeightStore
+from neurosym.errors import InputError
 from neurosym.language.demonstrations import Demonstrations
 from neurosym.planning.prior import OrderScores, Prior, as_picture_batch
 
 if TYPE_CHECKING:
     from neurosym.language.problem import Problem
-
-
-@dataclass(frozen=True, eq=False)
-class _Weights:
-    """A network with its header, and the file it came from (None: it was trained here)."""
-
-    network: OrderNetwork
-    header: dict[str, Any]
-    path: Path | None = None
 
 
 class NetworkPrior(Prior):
@@ -67,10 +59,9 @@ class NetworkPrior(Prior):
         self.domain = domain
         self.encoder = encoder
         self.device = _checked_device(device)
-        self._own: _Weights | None = None
-        self._choices: dict[Hashable, _Weights] = {}
+        self._weights = WeightStore(self.recipe, domain, encoder, self.device)
         if weights is not None:
-            self._own = self._loaded(Path(weights))
+            self._weights.own = self._weights.load(Path(weights))
 
     @property
     def labels(self) -> str:
@@ -85,7 +76,7 @@ class NetworkPrior(Prior):
     @property
     def header(self) -> dict[str, Any]:
         """What the weights say of themselves: prior, domain, actions, network, training. Empty before there are any."""
-        return dict(self._own.header) if self._own else {}
+        return dict(self._weights.own.header) if self._weights.own else {}
 
     @overload
     def read(self, pictures: NDArray[np.uint8]) -> OrderScores: ...
@@ -101,7 +92,7 @@ class NetworkPrior(Prior):
             One `OrderScores` for one set of pictures, a list of M for a batch; columns named as in the training.
         """
         batch, single = as_picture_batch(pictures)
-        weights = self._weights_for_pictures(batch.shape[1:])
+        weights = self._weights.for_pictures(batch.shape[1:])
         found = self._read(weights, batch)
         return found[0] if single else found
 
@@ -119,9 +110,9 @@ class NetworkPrior(Prior):
             int64 (M, T) for a batch, (T,) for one: indices into the actions of the training; -1 after the last step.
         """
         batch, single = as_picture_batch(pictures)
-        weights = self._weights_for_pictures(batch.shape[1:])
+        weights = self._weights.for_pictures(batch.shape[1:])
         config = weights.network.config
-        classes = _classes_of(weights) if self.recipe.train.sum_classes else ()
+        classes = weights.classes if self.recipe.train.sum_classes else ()
         found = [np.empty((0, config.n_steps), dtype=np.int64)]
         for logits in self._logits(weights, batch):
             if self.recipe.predicts == "independent":
@@ -141,7 +132,7 @@ class NetworkPrior(Prior):
         Raises:
             InputError: a problem has no pictures, pictures of another shape, or actions that the network does not know.
         """
-        groups: dict[_Weights, list[int]] = {}
+        groups: dict[Weights, list[int]] = {}
         pictures: list[NDArray[np.uint8]] = []
         for k, problem in enumerate(problems):
             observation = problem.observation
@@ -150,8 +141,8 @@ class NetworkPrior(Prior):
                     f"Expected pictures of the problem {problem.name!r}, from which this prior reads; it has none. "
                     "Give it some (problem.with_pictures), or plan with prior=None."
                 )
-            weights = self._weights_for_problem(problem)
-            pictures.append(_checked_pictures(np.asarray(observation), weights))
+            weights = self._weights.for_problem(problem)
+            pictures.append(weights.checked(np.asarray(observation)))
             groups.setdefault(weights, []).append(k)
         found: dict[int, OrderScores] = {}
         for weights, index in groups.items():
@@ -186,29 +177,9 @@ class NetworkPrior(Prior):
             settings: fields of the `TrainConfig` to change, ``{"epochs": 25, "rate": 4e-3}``; `epochs` goes before.
         """
         if device is not None:
-            self.device = _checked_device(device)
-        views, height, width, colours = demonstrations.pictures.shape[1:]
-        n_steps, n_actions = demonstrations.sequences.shape[1], len(demonstrations.actions)
-        shortest = int(demonstrations.lengths.min())
-        one_view = views == 1 and max(height, width) < 2 * min(height, width)
-        variant = self.recipe.variant(all_actions=shortest == n_actions, one_view=one_view)
-        train = config or self.recipe.train.changed(variant.settings)
-        train = train.changed(settings or {})
-        if epochs is not None:
-            if epochs < 1:
-                raise InputError(f"Expected at least one epoch; got {epochs}.")
-            train = replace(train, epochs=epochs, least_steps=0, most_steps=None)
-        network = NetworkConfig(
-            encoder=self.encoder or "small",
-            head=variant.head,
-            decoding=self.recipe.decoding,
-            picture_shape=(views, height, width, colours),
-            n_steps=n_steps,
-            n_actions=n_actions,
-            width=variant.width,
-            temperature=train.temperature if self.recipe.decoding == "sinkhorn" else 1.0,
-            stop=self.recipe.stop if shortest < n_steps else "none",
-            iterations=train.iterations if self.recipe.decoding == "sinkhorn" and n_steps < n_actions else None,
+            self.device = self._weights.device = _checked_device(device)
+        network, train = self.recipe.configured(
+            demonstrations, encoder=self.encoder or "small", epochs=epochs, config=config, settings=settings
         )
         fitted = fit(
             demonstrations,
@@ -228,7 +199,7 @@ class NetworkPrior(Prior):
         }
         if demonstrations.classes:
             header["classes"] = list(demonstrations.classes)
-        self._own = _Weights(fitted.network, header)
+        self._weights.own = Weights(fitted.network, header)
         return self
 
     def save(self, path: str | Path, *, notes: Mapping[str, Any] | None = None) -> Path:
@@ -237,14 +208,15 @@ class NetworkPrior(Prior):
         Args:
             notes: kept in the header under ``"demonstrations"``: where they came from (split, pictures, seed).
         """
-        if self._own is None:
+        own = self._weights.own
+        if own is None:
             raise InputError("Expected a prior that was trained, or given weights; this one has none. Call fit first.")
-        header = {**self._own.header, "demonstrations": dict(notes)} if notes else self._own.header
-        save_network(Path(path), self._own.network, header)
+        header = {**own.header, "demonstrations": dict(notes)} if notes else own.header
+        save_network(Path(path), own.network, header)
         return Path(path)
 
-    def _read(self, weights: _Weights, batch: NDArray[np.uint8]) -> list[OrderScores]:
-        network, actions, classes = weights.network, tuple(weights.header["actions"]), _classes_of(weights)
+    def _read(self, weights: Weights, batch: NDArray[np.uint8]) -> list[OrderScores]:
+        network, actions, classes = weights.network, tuple(weights.header["actions"]), weights.classes
         found: list[OrderScores] = []
         for logits in self._logits(weights, batch):
             tables = network.log_prob(logits).cpu().numpy()
@@ -253,54 +225,15 @@ class NetworkPrior(Prior):
             found += [OrderScores(table, actions, n, classes) for table, n in zip(tables, lengths)]
         return found
 
-    def _logits(self, weights: _Weights, batch: NDArray[np.uint8]) -> Iterator[Logits]:
+    def _logits(self, weights: Weights, batch: NDArray[np.uint8]) -> Iterator[Logits]:
         """What the network says of the pictures, chunk by chunk."""
         if len(batch):
-            _checked_pictures(batch[0], weights)
+            weights.checked(batch[0])
         for start in range(0, len(batch), CHUNK):
             with torch.inference_mode():
                 pictures = torch.from_numpy(np.ascontiguousarray(batch[start : start + CHUNK])).to(self.device)
                 logits: Logits = weights.network(weights.network.prepare(pictures))
             yield logits
-
-    def _loaded(self, path: Path) -> _Weights:
-        network, header = load_network(path)
-        trained = RECIPES.get(str(header.get("prior")))
-        shared = trained is not None and trained.trained_as == self.recipe.trained_as
-        if header.get("prior") != self.recipe.name and not shared:
-            raise CheckpointError(
-                f"Expected weights of the prior {self.recipe.name!r} in {path}; got those of {header.get('prior')!r}. "
-                f"Load them by the file's name: load_prior({str(path)!r})."
-            )
-        if self.encoder not in (None, network.config.encoder):
-            raise CheckpointError(
-                f"Expected weights of the encoder {self.encoder!r} in {path}; got {network.config.encoder!r}. "
-                "Leave encoder=None to take what the file has."
-            )
-        # What is saved from here is to be read as this prior reads it.
-        return _Weights(network.to(self.device), {**header, "prior": self.recipe.name}, path)
-
-    def _weights_for_problem(self, problem: Problem) -> _Weights:
-        family, actions = problem.family, tuple(problem.actions)
-        return self._weights((family, actions), lambda: bundled.for_actions(self.recipe.trained_as, family, actions))
-
-    def _weights_for_pictures(self, shape: tuple[int, ...]) -> _Weights:
-        return self._weights(shape, lambda: bundled.for_pictures(self.recipe.trained_as, shape))
-
-    def _weights(self, question: Hashable, choose: Callable[[], Path]) -> _Weights:
-        """Our own weights, or bundled ones; which file answers a question is looked up once, and loaded once."""
-        if self._own:
-            return self._own
-        if question not in self._choices:
-            name = self.recipe.trained_as
-            path = bundled.for_domain(name, self.domain) if self.domain is not None else choose()
-            known = [w for w in self._choices.values() if w.path == path]
-            self._choices[question] = known[0] if known else self._loaded(path)
-        return self._choices[question]
-
-
-def _classes_of(weights: _Weights) -> tuple[int, ...]:
-    return tuple(weights.header.get("classes", ()))
 
 
 def _likeliest_by_step(logits: Logits) -> NDArray[np.int64]:
@@ -325,14 +258,3 @@ def _checked_device(name: str) -> torch.device:
     if device.type == "cuda" and not torch.cuda.is_available():
         raise InputError("Expected a CUDA device, as asked for; torch finds none. Use device='cpu'.")
     return device
-
-
-def _checked_pictures(pictures: NDArray[np.uint8], weights: _Weights) -> NDArray[np.uint8]:
-    """The pictures of one piece of work, if they are such as the network was trained on."""
-    expected = weights.network.config.picture_shape
-    if pictures.shape != expected or pictures.dtype != np.uint8:
-        raise InputError(
-            f"Expected pictures as uint8 (V, H, W, 3) = {expected}, as this prior was trained on; "
-            f"got {pictures.dtype} {pictures.shape}. Render them alike, or train a prior on yours."
-        )
-    return pictures

@@ -3,76 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
-from learned_priors.networks import Decoding, Head, Stop
-from neurosym.errors import UnknownNameError
-
-Loss = Literal["gumbel-sinkhorn", "sinkhorn", "rows"]
-
-
-@dataclass(frozen=True, kw_only=True)
-class TrainConfig:
-    """How a network is trained.
-
-    Attributes:
-        loss: "gumbel-sinkhorn" (the paper's: samples of the permutation against the demonstration, mean squared
-            error), "sinkhorn" (cross-entropy of log S(X)) or "rows" (cross-entropy of a softmax a step).
-        soft: learn from the demonstrations' marginals where there are some; otherwise from their sequences.
-        epochs: passes over the demonstrations.
-        least_steps: with few demonstrations, epochs are added until so many updates are made.
-        most_steps: with many demonstrations, epochs are left out until there are no more updates; None leaves out none.
-        batch: demonstrations an update.
-        optimizer: "adam" or "adamw" (with `weight_decay`).
-        rate: learning rate (the peak, with "one-cycle").
-        schedule: "constant", or "one-cycle" (up for 30% of the updates, then down to nothing, by cosines).
-        iterations: of the Sinkhorn operator, a fixed number in training.
-        samples, temperature, noise: of Gumbel-Sinkhorn.
-        classes: one integer an action; actions of one class are interchangeable, their probabilities are summed
-            before the logarithm. Empty: each is its own.
-        sum_classes: take `classes` from the demonstrations where it is empty.
-        held_out: share of the groups of demonstrations that is kept from training and only measured.
-        keep: "last" or "best", the weights of the epoch with the least held-out loss.
-        patience: stop when the held-out loss has not improved for so many epochs; None never stops early.
-        calibrate: divide the logits by the temperature that suits what is held out best (Guo et al., ICML 2017), if
-            anything is held out. It changes how sure the network is, hardly which order it prefers.
-        precision: "float32" or "bfloat16" (autocast; pays for convolutions on hardware made for it).
-        checkpoint_seconds: least time between two checkpoints, if one is asked for.
-    """
-
-    loss: Loss
-    soft: bool
-    epochs: int
-    least_steps: int = 0
-    most_steps: int | None = None
-    batch: int = 128
-    optimizer: Literal["adam", "adamw"] = "adamw"
-    weight_decay: float = 0.01
-    rate: float = 2e-3
-    schedule: Literal["constant", "one-cycle"] = "one-cycle"
-    iterations: int = 20
-    samples: int = 5
-    temperature: float = 1.0
-    noise: float = 1.0
-    classes: tuple[int, ...] = ()
-    sum_classes: bool = False
-    held_out: float = 0.0
-    keep: Literal["last", "best"] = "last"
-    patience: int | None = None
-    calibrate: bool = False
-    precision: Literal["float32", "bfloat16"] = "float32"
-    checkpoint_seconds: float = 5.0
-
-    def changed(self, settings: Mapping[str, Any]) -> TrainConfig:
-        """With other values of some fields. Raises `UnknownNameError` for what is none."""
-        for name in settings:
-            if name not in self.__dataclass_fields__:
-                raise UnknownNameError("training setting", name, self.__dataclass_fields__)
-        return replace(self, **settings)
-
-    def to_json(self) -> dict[str, Any]:
-        return {**asdict(self), "classes": list(self.classes)}
+from learned_priors.networks import Decoding, Head, NetworkConfig, Stop
+from learned_priors.train_config import TrainConfig
+from neurosym.errors import InputError, UnknownNameError
+from neurosym.language.demonstrations import Demonstrations
 
 
 @dataclass(frozen=True)
@@ -117,6 +54,40 @@ class Recipe:
         if found is None and not all_actions:
             found = self.some_actions
         return found or Variant(self.head, self.width)
+
+    def configured(
+        self,
+        demonstrations: Demonstrations,
+        *,
+        encoder: str,
+        epochs: int | None = None,
+        config: TrainConfig | None = None,
+        settings: Mapping[str, Any] | None = None,
+    ) -> tuple[NetworkConfig, TrainConfig]:
+        """The network, and how it is trained, for these demonstrations; see `NetworkPrior.fit`."""
+        views, height, width, colours = demonstrations.pictures.shape[1:]
+        n_steps, n_actions = demonstrations.sequences.shape[1], len(demonstrations.actions)
+        shortest = int(demonstrations.lengths.min())
+        one_view = views == 1 and max(height, width) < 2 * min(height, width)
+        variant = self.variant(all_actions=shortest == n_actions, one_view=one_view)
+        train = (config or self.train.changed(variant.settings)).changed(settings or {})
+        if epochs is not None:
+            if epochs < 1:
+                raise InputError(f"Expected at least one epoch; got {epochs}.")
+            train = replace(train, epochs=epochs, least_steps=0, most_steps=None)
+        network = NetworkConfig(
+            encoder=encoder,
+            head=variant.head,
+            decoding=self.decoding,
+            picture_shape=(views, height, width, colours),
+            n_steps=n_steps,
+            n_actions=n_actions,
+            width=variant.width,
+            temperature=train.temperature if self.decoding == "sinkhorn" else 1.0,
+            stop=self.stop if shortest < n_steps else "none",
+            iterations=train.iterations if self.decoding == "sinkhorn" and n_steps < n_actions else None,
+        )
+        return network, train
 
     def __post_init__(self) -> None:
         if not self.trained_as:

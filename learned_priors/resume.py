@@ -15,7 +15,7 @@ from torch import Tensor
 
 from learned_priors.checkpoints import read_tensors, write_tensors
 from learned_priors.networks import NetworkConfig, OrderNetwork
-from learned_priors.recipes import TrainConfig
+from learned_priors.train_config import TrainConfig
 from neurosym.errors import CheckpointError
 from neurosym.language.demonstrations import Demonstrations
 

@@ -1,4 +1,4 @@
-"""The Sinkhorn operator, and the two priors that decode through it.
+"""The Sinkhorn operator, for training and for reading.
 
 S(X) alternates row and column normalisation of exp(X) until both sum to one: "the permutation analogue of a
 softmax" (Burke, Subr, Ramamoorthy, RA-L 2021, eqs. 3 to 5; Mena, Belanger, Linderman, Snoek, ICLR 2018,
@@ -10,16 +10,11 @@ likelihood taken after a last column normalisation is not bounded below.)
 from __future__ import annotations
 
 import math
-from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor
-
-if TYPE_CHECKING:
-    from learned_priors.network_prior import NetworkPrior
 
 #: Sums of rows and columns may be off by this much: far below what changes an order, and reached within some tens
 #: of iterations on trained logits.
@@ -250,44 +245,3 @@ def gumbel_sinkhorn(
     tiny = torch.finfo(logits.dtype).tiny
     gumbel = -torch.log(-torch.log(uniform.clamp(tiny, 1 - torch.finfo(logits.dtype).eps)))
     return log_sinkhorn((logits + noise * gumbel) / temperature, tolerance=None, max_iterations=iterations)
-
-
-def sinkhorn(
-    *,
-    weights: str | Path | None = None,
-    domain: str | None = None,
-    encoder: str | None = None,
-    device: str = "cpu",
-) -> NetworkPrior:
-    """The full recipe: the share of all valid orders with each action at each step, cross-entropy through Sinkhorn.
-
-    Args:
-        weights: a ``.safetensors`` file; None takes the bundled ones of the problem's domain.
-        domain: the problem family whose bundled weights to take; None asks the problem, or fits the pictures.
-        encoder: what `fit` builds; None is the small one.
-        device: ``"cpu"`` or ``"cuda"``.
-    """
-    return _prior("sinkhorn", weights, domain, encoder, device)
-
-
-def sinkhorn_paper(
-    *,
-    weights: str | Path | None = None,
-    domain: str | None = None,
-    encoder: str | None = None,
-    device: str = "cpu",
-) -> NetworkPrior:
-    """The paper's recipe: one demonstration a picture, Gumbel-Sinkhorn with five samples, mean squared error.
-
-    Arguments as for `sinkhorn`.
-    """
-    return _prior("sinkhorn-paper", weights, domain, encoder, device)
-
-
-def _prior(
-    recipe: str, weights: str | Path | None, domain: str | None, encoder: str | None, device: str
-) -> NetworkPrior:
-    # Imported here because the network decodes through the operator above.
-    from learned_priors.network_prior import NetworkPrior
-
-    return NetworkPrior(recipe, weights=weights, domain=domain, encoder=encoder, device=device)

@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 
 from learned_priors.learner import Learner
 from learned_priors.networks import NetworkConfig, OrderNetwork
-from learned_priors.recipes import TrainConfig
 from learned_priors.resume import RunState, fingerprint, load_state, save_state
+from learned_priors.train_config import TrainConfig
 from neurosym.errors import DemonstrationError, InputError
 from neurosym.language.demonstrations import Demonstrations
 

@@ -21,7 +21,7 @@ from learned_priors.encoders import SmallEncoder, build_encoder, encoder_names, 
 from learned_priors.network_prior import NetworkPrior
 from learned_priors.networks import NetworkConfig, OrderNetwork
 from learned_priors.recipes import RECIPES
-from learned_priors.tcn import TemporalDecoder, dilations
+from learned_priors.temporal import TemporalDecoder, dilations
 from neurosym.errors import CheckpointError, ContractError, InputError, UnknownNameError
 from neurosym.language.demonstrations import Demonstrations
 from neurosym.planning.prior import OrderScores, Prior, RandomPrior, UniformPrior

@@ -234,8 +234,8 @@ def test_what_tells_the_length_is_built_only_where_lengths_differ() -> None:
     for name, stop in built.items():
         for learn, expected in ((towers(20), "none"), (towers(20, shortest=2), stop)):
             prior = trained(name, learn, least_steps=0)
-            assert prior._own is not None
-            assert prior._own.network.config.stop == expected
+            assert prior._weights.own is not None
+            assert prior._weights.own.network.config.stop == expected
 
 
 def test_decoding_takes_the_likeliest_length_first() -> None:
