@@ -20,7 +20,8 @@ from neurosym.plotting import (
     scores_figure,
     search_figure,
 )
-from neurosym.plotting.layers import box_width, in_layers, shortened
+from neurosym.plotting.labels import shortened
+from neurosym.plotting.layers import box_width, in_layers
 from neurosym.plotting.routes import bends, curve
 from neurosym.plotting.search import MOST_REFUSALS, ON_PLAN, REFUSED
 from neurosym.testing.toys import NumberLine

@@ -18,9 +18,6 @@ if TYPE_CHECKING:
 #: Width and height of pictures, in pixels, unless told otherwise.
 FILM_SIZE, STILL_SIZE = (640, 480), (960, 720)
 
-#: What an exploded view may be written as.
-STILLS = (".png", ".svg", ".pdf")
-
 
 def render(
     what: Annotated[
@@ -45,13 +42,13 @@ def render(
         Path | None,
         typer.Option(
             "--exploded",
-            metavar="FILE",
-            help="The parts pulled apart, as the plan does: a picture (.png), or for print (.svg, .pdf).",
+            metavar="FILE.png",
+            help="The parts pulled apart, as the plan does: a picture.",
         ),
     ] = None,
     spread: Annotated[float, typer.Option("--spread", min=0.0, help="How far apart in the exploded view.")] = 1.0,
     size: Annotated[
-        str | None, typer.Option("--size", metavar="WxH", help="In pixels; default 640x480, and 960x720 for PNG.")
+        str | None, typer.Option("--size", metavar="WxH", help="In pixels; default 640x480, and 960x720 exploded.")
     ] = None,
     view: Annotated[
         str | None,
@@ -75,28 +72,19 @@ def render(
         raise InputError(f"Expected --plan with --out {out}: a film shows a plan (`neurosym plan ... --out`).")
     if out is not None:
         check_film(out)
-    if exploded is not None and exploded.suffix.lower() not in STILLS:
-        raise InputError(f"Expected --exploded with a file that ends in {', '.join(STILLS)}; got {str(exploded)!r}.")
-    if size is not None and out is None and exploded is not None and exploded.suffix.lower() != ".png":
-        raise InputError(f"Expected --size with a film or a .png; {exploded} is as wide as a column of print.")
-    camera = seen_from = None
+    if exploded is not None and exploded.suffix.lower() != ".png":
+        raise InputError(f"Expected --exploded with a PNG, as FILE.png; got {str(exploded)!r}.")
+    camera = None
     if view is not None:
         pattern = r"(-?\d+(?:\.\d+)?),(-?\d+(?:\.\d+)?)"
         azimuth, elevation = _two(view, pattern, "--from AZIMUTH,ELEVATION, as -58,24")
-        seen_from = azimuth, elevation
         camera = Camera(azimuth, elevation, field_of_view=DEFAULT_CAMERA.field_of_view)
     film_size, still_size = FILM_SIZE, STILL_SIZE
     if size is not None:
         width, height = _two(size, r"(\d{2,4})x(\d{2,4})", "--size WxH, as 640x480")
         film_size = still_size = (int(width), int(height))
     staging, title = _staging(what, plan, number, files, {"collapse": collapse, **family_options(option)})
-    if exploded is not None and exploded.suffix.lower() != ".png":
-        from neurosym.plotting import exploded_figure, save
-
-        sides = {} if seen_from is None else {"view": seen_from}
-        save(exploded_figure(staging, spread=spread, title=title, **sides), exploded)
-        print(f"{exploded}: {title}, {len(staging.assembly)} parts pulled apart.")
-    elif exploded is not None:
+    if exploded is not None:
         picture = exploded_view(staging, spread=spread, size=still_size, camera=camera, title=title)
         print(f"{still(picture, exploded)}: {title}, {len(staging.assembly)} parts pulled apart.")
     if out is not None:

@@ -6,7 +6,6 @@ from neurosym.plotting.confusion import confusion_figure
 from neurosym.plotting.curves import Curves, Spread, curves_figure
 from neurosym.plotting.density import density_figure, kernel_density
 from neurosym.plotting.errors import classes_figure, repeats_figure
-from neurosym.plotting.exploded import exploded_figure
 from neurosym.plotting.graphs import blocking_figure, contact_figure
 from neurosym.plotting.iterations import LAST_BAR, iterations_figure
 from neurosym.plotting.learning import learning_figure
@@ -31,7 +30,6 @@ __all__ = [
     "contact_figure",
     "curves_figure",
     "density_figure",
-    "exploded_figure",
     "iterations_figure",
     "kernel_density",
     "learning_figure",

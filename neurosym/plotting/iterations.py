@@ -9,7 +9,7 @@ import numpy as np
 
 from neurosym.experiments.benchmark import NO_PRIOR, Outcome, Run
 from neurosym.experiments.reporting import published
-from neurosym.plotting.layers import shortened
+from neurosym.plotting.labels import shortened
 from neurosym.plotting.style import COLOURS, COLUMN, LOOKS
 
 if TYPE_CHECKING:

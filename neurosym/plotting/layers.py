@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import networkx as nx
 
+from neurosym.plotting.labels import shortened
 from neurosym.plotting.style import COLUMN
 
 if TYPE_CHECKING:
@@ -17,8 +18,6 @@ if TYPE_CHECKING:
 
 #: Letters of names (points), and what one of them takes (inches).
 LETTERS, LETTER_WIDTH = 6.5, 0.058
-#: Longest name; what is longer is cut.
-MOST_LETTERS = 14
 #: Height of a box, room around it, between rows of one layer, and between layers (inches).
 BOX, GAP, STAGGER, LAYER = 0.15, 0.09, 0.24, 0.45
 #: Passes of sorting each layer by its neighbours.
@@ -72,22 +71,6 @@ def in_layers(
         depth += STAGGER * (rows - 1) + apart
     height = depth - apart + BOX
     return Layout({name: (x, y + height) for name, (x, y) in places.items()}, height)
-
-
-def shortened(name: str, most: int = MOST_LETTERS) -> str:
-    """A name of at most so many letters; what is longer loses its middle, as names often differ at their ends."""
-    if len(name) <= most:
-        return name
-    tail = (most - 1) // 2
-    return name[: most - 1 - tail] + "…" + name[len(name) - tail :]
-
-
-def without_common(names: Sequence[str]) -> dict[str, str]:
-    """Names without what all of them share: ``remove(leg)`` among removals is ``leg``."""
-    heads = {name.partition("(")[0] for name in names}
-    if len(heads) == 1 and all(name.endswith(")") and "(" in name for name in names):
-        return {name: name.partition("(")[2][:-1] for name in names}
-    return {name: name for name in names}
 
 
 def box_width(name: str) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from neurosym.geometry.step_motion import GROUND
-from neurosym.plotting.layers import shortened
+from neurosym.plotting.labels import shortened
 from neurosym.plotting.style import COLUMN, SMALL, TITLE, tidy
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from neurosym.planning.prior import OrderScores
-from neurosym.plotting.layers import shortened, without_common
+from neurosym.plotting.labels import shortened, without_common
 from neurosym.plotting.style import COLOURS, COLUMN, SMALL, TITLE, tidy
 
 if TYPE_CHECKING:

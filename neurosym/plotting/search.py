@@ -7,8 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from neurosym.planning.planner import PlanResult
-from neurosym.plotting.labels import width_of
-from neurosym.plotting.layers import shortened, without_common
+from neurosym.plotting.labels import shortened, width_of, without_common
 from neurosym.plotting.style import COLOURS, COLUMN, SMALL, TITLE
 
 if TYPE_CHECKING:
