@@ -10,8 +10,8 @@ import argparse
 
 import neurosym as ns
 from neurosym.experiments.benchmark import Comparison, Outcome, ask_priors, run
-from neurosym.experiments.reporting import rows
-from neurosym.plotting import iterations_figure, save
+from neurosym.experiments.reporting import figure_of, rows
+from neurosym.plotting import save
 
 
 class TallestFirst(ns.Prior):
@@ -48,7 +48,7 @@ def main(problems: int = 24, priors: tuple[str, ...] = (), out: str | None = Non
         fewer = means[planner, "tallest-first"] < means[planner, "none"]
         print(f"{planner}: looking at heights {'saves' if fewer else 'does not save'} iterations")
     if out:
-        print(f"figure: {save(iterations_figure(outcome), out)}")
+        print(f"figure: {save(figure_of(outcome), out)}")
     return means
 
 

@@ -13,11 +13,8 @@ from neurosym.experiments.reproduce import Experiment, reproduce, soma_experimen
 
 def main(given: Experiment, out: str = "out/reproduce-soma", **options) -> dict[str, float]:
     records = reproduce(given, Path(out), say=print, **options)
-    failures: dict[str, list[float]] = {}
-    for r in records:
-        if r.metric == "initial_failures":
-            failures.setdefault(f"{r.method}, {r.pictures} pictures", []).append(r.value)
-    shares = {what: sum(values) / len(values) for what, values in failures.items()}
+    failures = records[records["metric"] == "initial_failures"].groupby(["method", "pictures"], sort=False)["value"]
+    shares = {f"{method}, {pictures} pictures": share for (method, pictures), share in failures.mean().items()}
     for what, share in shares.items():
         print(f"{what}: the first order fails on {100 * share:.1f}% of the cubes")
     print(f"{out}: report.md, results.csv and figures")

@@ -14,7 +14,7 @@ import tempfile
 from pathlib import Path
 
 import neurosym as ns
-from neurosym.experiments.fixed_order import order_fails
+from neurosym.experiments.baselines import order_fails
 
 
 def main(recipe: str = "paper", epochs: int | None = 40, tested: int = 40, out: str | None = None) -> dict[str, float]:

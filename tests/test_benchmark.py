@@ -9,8 +9,8 @@ import pytest
 
 import neurosym as ns
 from neurosym.experiments import benchmark
+from neurosym.experiments.baselines import best_fixed_order, order_fails
 from neurosym.experiments.benchmark import Comparison, Outcome, Run, ask_priors, image_blind, run
-from neurosym.experiments.fixed_order import best_fixed_order, order_fails
 from neurosym.experiments.journal import Journal, key_of
 from neurosym.experiments.reporting import markdown, rows, table, write_csv
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
+from dataclasses import astuple, replace
 
 import numpy as np
+import pandas as pd
 import pytest
 from matplotlib.text import Text
 from PIL import Image
@@ -13,13 +14,13 @@ from PIL import Image
 import neurosym as ns
 from neurosym.cli import main
 from neurosym.commands.exit_codes import BAD_INPUT
-from neurosym.experiments.conclusions import findings
-from neurosym.experiments.csv_lines import Record
+from neurosym.experiments.conclusions import conclusions
 from neurosym.experiments.imitation import study, study_names
-from neurosym.experiments.imitation_report import report, write_results
 from neurosym.experiments.order_accuracy import Counts
+from neurosym.experiments.reporting import RECORD
 from neurosym.experiments.results_page import LARGEST, finished_runs, write_results_page
 from neurosym.experiments.study_figures import figures
+from neurosym.experiments.study_report import report, write_results
 from neurosym.experiments.study_results import Results
 from neurosym.plotting import COLUMN, kernel_density
 
@@ -53,13 +54,12 @@ def made_up(name: str, means: dict | None = None, *, seeds: int = 2, **changes) 
             mean = (means or {}).get((trial.method, metric), rng.uniform(0.2, 0.8))
             value = mean[trial.n] if isinstance(mean, dict) else mean
             offset = 0.01 * (trial.seed - (seeds - 1) / 2)
-            records.append(
-                Record(name, trial.pictures, trial.method, trial.n, trial.seed, metric, float(value + offset))
-            )
+            records.append((*astuple(trial), metric, float(value + offset)))
         if trial.method not in given.baselines:
             own = counts(labels, np.random.default_rng(trial.seed), lengths=lengths)
             counted.setdefault((trial.pictures, trial.method, trial.n), []).append(own)
-    return Results(given, tuple(records), {cell: Counts.pooled(own) for cell, own in counted.items()})
+    pooled = {cell: Counts.pooled(own) for cell, own in counted.items()}
+    return Results(given, pd.DataFrame(records, columns=RECORD), pooled)
 
 
 def texts(figure):
@@ -166,24 +166,24 @@ def whole(**changes: float) -> Results:
 
 
 def test_the_order_is_said_as_it_comes_out():
-    assert findings(whole(), "hard")[0].startswith("Whole sequences come out in the paper's order: bc 0.400")
-    said = findings(whole(**{"sinkhorn-paper": 0.55}), "hard")[0]
+    assert conclusions(whole(), "hard")[0].startswith("Whole sequences come out in the paper's order: bc 0.400")
+    said = conclusions(whole(**{"sinkhorn-paper": 0.55}), "hard")[0]
     assert "**not**" in said
     assert "8 of its 10 pairs do" in said
     assert "`sinkhorn-paper` (0.550) is behind `tcn-paper` (0.600)" in said
     assert "`sinkhorn-paper` (0.550) is behind `tcn-paper+hungarian` (0.700)" in said
-    level = findings(whole(bc=0.5), "hard")[0]
+    level = conclusions(whole(bc=0.5), "hard")[0]
     assert "9 of its 10 pairs do" in level
     assert "`bc+hungarian` (0.500) is level with `bc` (0.500)" in level
 
 
 def test_whether_ours_is_ahead_is_said_as_it_comes_out():
-    ahead = [s for s in findings(whole(), "hard") if "each of the paper's in whole sequences (" in s]
+    ahead = [s for s in conclusions(whole(), "hard") if "each of the paper's in whole sequences (" in s]
     assert ahead == [
         "`sinkhorn` is ahead of each of the paper's in whole sequences (0.900; next is `sinkhorn-paper`, 0.800, behind "
         "in 2 of 2 seeds)."
     ]
-    behind = [s for s in findings(whole(sinkhorn=0.65), "hard") if "each of the paper's in whole sequences (" in s]
+    behind = [s for s in conclusions(whole(sinkhorn=0.65), "hard") if "each of the paper's in whole sequences (" in s]
     assert behind == [
         "`sinkhorn` is **not** ahead of each of the paper's in whole sequences (0.650 against `tcn-paper+hungarian`, "
         "0.700, `sinkhorn-paper`, 0.800)."
@@ -191,16 +191,16 @@ def test_whether_ours_is_ahead_is_said_as_it_comes_out():
 
 
 def test_baselines_are_named_even_where_networks_are_below_them():
-    said = next(s for s in findings(whole(), "hard") if s.startswith("Above the memoriser in whole"))
+    said = next(s for s in conclusions(whole(), "hard") if s.startswith("Above the memoriser in whole"))
     assert said.startswith("Above the memoriser in whole sequences (0.850): not above: `bc`")
     assert said.endswith("above: `sinkhorn`.")
 
 
 def test_what_is_asked_of_ours_is_answered_by_the_numbers():
-    asked = [s for s in findings(whole(), "hard") if s.startswith("Asked of `sinkhorn`")]
+    asked = [s for s in conclusions(whole(), "hard") if s.startswith("Asked of `sinkhorn`")]
     assert "Asked of `sinkhorn`: At least .85 whole on hard pictures. Here it **holds**: 0.900 at n = 200." in asked
     assert "Asked of `sinkhorn`: No block twice. Here it **does not hold**: 0.010 at n = 200." in asked
-    below = findings(whole(sinkhorn=0.8), "hard")
+    below = conclusions(whole(sinkhorn=0.8), "hard")
     assert any("At least .85 whole on hard pictures. Here it **does not hold**: 0.800" in s for s in below)
 
 
@@ -210,7 +210,7 @@ def test_claims_look_at_every_n_and_only_where_they_bear():
     above = {first: {100: 0.5, 200: 0.6}, second: {100: 0.4, 200: 0.5}}
     crossing = {**above, second: {100: 0.4, 200: 0.7}}
     for means, verdict in ((above, "holds"), (crossing, "does not hold")):
-        said = findings(made_up("variable", means, sizes=sizes), "hard")
+        said = conclusions(made_up("variable", means, sizes=sizes), "hard")
         claim = next(s for s in said if "BC+Sinkhorn is ahead of BC+TCN+Hungarian" in s)
         assert f"**{verdict}**" in claim
         assert not any("from 400 demonstrations on" in s for s in said)  # no such n was run
@@ -218,7 +218,7 @@ def test_claims_look_at_every_n_and_only_where_they_bear():
 
 def test_fewer_methods_leave_sentences_out_and_nothing_breaks(tmp_path):
     results = made_up("tower", methods=("bc",), baselines=("blind",))
-    assert not any("sinkhorn" in s for s in findings(results, "hard"))
+    assert not any("sinkhorn" in s for s in conclusions(results, "hard"))
     write_results(results, tmp_path)
     assert "| 200 | bc |" in (tmp_path / "report.md").read_text()
 

@@ -11,8 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import neurosym as ns
-from neurosym.experiments.order_accuracy import NONE, Counts, averages, classes_of, compare_orders, seen_in
-from neurosym.experiments.order_baselines import BASELINES, blind, memoriser
+from neurosym.experiments.baselines import BASELINES, blind, memoriser
+from neurosym.experiments.order_accuracy import Counts, averages, classes_of, compare_orders, seen_in
+
+NONE = "none"
 
 #: Three colours, of which one has three blocks.
 ACTIONS = ("red-1", "red-2", "red-3", "blue-1", "blue-2", "green")

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+import pandas as pd
 import pytest
 
-from neurosym.experiments.csv_lines import Record
-from neurosym.experiments.planning_report import findings, methods_figure, report
+from neurosym.experiments.planning_report import conclusions, methods_figure, report
+from neurosym.experiments.reporting import RECORD
 from neurosym.experiments.reproduce import Experiment
 
 SOMA = Experiment("soma", splits=2, styles=("clean",), methods=("sinkhorn", "sinkhorn-paper", "tcn-paper"))
@@ -14,38 +15,38 @@ FAILURES = {"sinkhorn": 0.05, "sinkhorn-paper": 0.3, "tcn-paper": 0.4, "random":
 ITERATIONS = {"sinkhorn": 0.1, "sinkhorn-paper": 1.0, "tcn-paper": 1.2, "random": 5.0}
 
 
-def records(failures=FAILURES, iterations=ITERATIONS) -> list[Record]:
+def records(failures=FAILURES, iterations=ITERATIONS) -> pd.DataFrame:
     found = []
     for split in range(SOMA.splits):
         shift = 0.01 * (2 * split - 1)
-        found += [Record("soma", "clean", m, 120, split, "initial_failures", v + shift) for m, v in failures.items()]
+        found += [("soma", "clean", m, 120, split, "initial_failures", v + shift) for m, v in failures.items()]
         for planner in SOMA.planners:
             metric = f"iterations {planner}"
-            found += [Record("soma", "clean", m, 120, split, metric, v + shift) for m, v in iterations.items()]
-    return found
+            found += [("soma", "clean", m, 120, split, metric, v + shift) for m, v in iterations.items()]
+    return pd.DataFrame(found, columns=RECORD)
 
 
 def test_the_papers_order_is_looked_for_in_both_figures():
-    said = findings(SOMA, records(), "clean")
+    said = conclusions(SOMA, records(), "clean")
     assert "The initial failures (%) come out in the paper's order: tcn-paper 40.00 > sinkhorn-paper 30.00 " in said[0]
     order = next(s for s in said if s.startswith("The iterations"))
     assert "come out in the paper's order: random 5.00 > tcn-paper 1.20 > sinkhorn-paper 1.00" in order
-    turned = findings(SOMA, records(failures={**FAILURES, "sinkhorn-paper": 0.5}), "clean")
+    turned = conclusions(SOMA, records(failures={**FAILURES, "sinkhorn-paper": 0.5}), "clean")
     assert "do **not** come out in the paper's order: sinkhorn-paper 50.00" in turned[0]
-    level = findings(SOMA, records(failures={**FAILURES, "sinkhorn-paper": 0.4}), "clean")
+    level = conclusions(SOMA, records(failures={**FAILURES, "sinkhorn-paper": 0.4}), "clean")
     assert "do **not** come out" in level[0]
 
 
 @pytest.mark.parametrize(("ours", "verb"), [(0.05, "is ahead of"), (0.3, "is **not** ahead of")])
 def test_ours_is_set_against_the_best_of_the_papers(ours, verb):
-    said = findings(SOMA, records(failures={**FAILURES, "sinkhorn": ours}), "clean")
+    said = conclusions(SOMA, records(failures={**FAILURES, "sinkhorn": ours}), "clean")
     percent = f"{100 * ours:.2f}"
     wanted = f"`sinkhorn` {verb} each of the paper's in initial failures (%): {percent}; the best of those is "
     assert wanted + "`sinkhorn-paper`, 30.00." in said
 
 
 def test_the_blind_order_is_named_with_those_that_do_no_better():
-    said = findings(SOMA, records(failures={**FAILURES, "tcn-paper": 0.7}), "clean")
+    said = conclusions(SOMA, records(failures={**FAILURES, "tcn-paper": 0.7}), "clean")
     assert "The best fixed order fails on 70.0%; less do `sinkhorn`, `sinkhorn-paper`, not less do `tcn-paper`." in said
 
 

@@ -9,13 +9,13 @@ import pytest
 import neurosym as ns
 from neurosym.experiments.benchmark import Comparison, Outcome, Run
 from neurosym.experiments.order_accuracy import Counts
+from neurosym.experiments.reporting import figure_of
 from neurosym.plotting import (
     COLOURS,
     COLUMN,
     Curves,
     classes_figure,
     curves_figure,
-    iterations_figure,
     repeats_figure,
     save,
 )
@@ -37,17 +37,17 @@ def texts(figure):
 
 
 def test_it_says_what_is_drawn_with_units_and_n():
-    said = " | ".join(texts(iterations_figure(outcome())))
+    said = " | ".join(texts(figure_of(outcome())))
     for piece in ("iterations (refusals", "30 problems × 2 seeds", "no prior", "sinkhorn", "swap-repair", "best-first"):
         assert piece in said
 
 
 def test_it_fits_a_column():
-    assert iterations_figure(outcome()).get_figwidth() == COLUMN
+    assert figure_of(outcome()).get_figwidth() == COLUMN
 
 
 def test_a_long_name_of_a_prior_leaves_room_for_the_bars():
-    figure = iterations_figure(outcome(priors=("none", "runs/" + "a-long-name-" * 6 + "7.safetensors")))
+    figure = figure_of(outcome(priors=("none", "runs/" + "a-long-name-" * 6 + "7.safetensors")))
     figure.draw_without_rendering()
     assert all(axis.get_window_extent().width > 0.5 * figure.bbox.width for axis in figure.axes)
     said = [t.get_text() for t in figure.axes[0].get_yticklabels()]
@@ -56,14 +56,14 @@ def test_a_long_name_of_a_prior_leaves_room_for_the_bars():
 
 
 def test_bars_are_shares_of_all_runs():
-    axis = iterations_figure(outcome(priors=("none",), planners=("swap-repair",))).axes[0]
+    axis = figure_of(outcome(priors=("none",), planners=("swap-repair",))).axes[0]
     heights = sum(patch.get_height() for patch in axis.patches)
     assert heights == pytest.approx(0.82)
 
 
 def test_the_published_mean_is_marked_where_there_is_one():
     def diamonds(given):
-        return [line for axis in iterations_figure(given).axes for line in axis.lines if line.get_marker() == "D"]
+        return [line for axis in figure_of(given).axes for line in axis.lines if line.get_marker() == "D"]
 
     assert [line.get_xdata()[0] for line in diamonds(outcome())] == [5.35]
     assert diamonds(outcome(priors=("sinkhorn",), planners=("best-first",))) == []
@@ -74,16 +74,16 @@ def test_colours_are_different_and_enough():
 
 
 def test_a_single_run_and_many_priors_can_be_drawn(tmp_path):
-    assert save(iterations_figure(outcome(n=1, seeds=1)), tmp_path / "one.png").stat().st_size > 1000
+    assert save(figure_of(outcome(n=1, seeds=1)), tmp_path / "one.png").stat().st_size > 1000
     many = tuple(f"p{i}" for i in range(12))
-    assert save(iterations_figure(outcome(priors=many, n=2)), tmp_path / "deep" / "many.pdf").exists()
+    assert save(figure_of(outcome(priors=many, n=2)), tmp_path / "deep" / "many.pdf").exists()
     assert [p.name for p in tmp_path.iterdir() if p.name.startswith(".")] == []
 
 
 def test_pyplot_is_never_loaded():
     code = (
         "import sys; sys.path.insert(0, 'tests'); from test_plotting import *;"
-        "iterations_figure(outcome(n=3)); assert 'matplotlib' in sys.modules;"
+        "figure_of(outcome(n=3)); assert 'matplotlib' in sys.modules;"
         "assert 'matplotlib.pyplot' not in sys.modules"
     )
     subprocess.run([sys.executable, "-c", code], check=True, cwd=str(__import__("pathlib").Path(__file__).parents[1]))
@@ -103,14 +103,14 @@ def counts_of(wrong):
 
 def test_equal_shares_of_methods_stand_side_by_side():
     same = counts_of(1)
-    axis = classes_figure("letters", {"tcn": same, "sinkhorn": same}).axes[0]
+    axis = classes_figure("letters", same.labels, {"tcn": same.confusion, "sinkhorn": same.confusion}).axes[0]
     places = [tuple(x) for line in axis.lines for x in line.get_xydata().round(6)]
     assert len(set(places)) == len(places) == 4
     assert all(abs(x - round(x)) < 0.4 for x, _ in places)  # still at their own class
 
 
 def test_markers_at_both_ends_are_whole():
-    for axis in repeats_figure("letters", {"tcn": counts_of(1)}).axes:
+    for axis in repeats_figure("letters", {"tcn": counts_of(1).repeats}).axes:
         low, high = axis.get_ylim()
         values = np.concatenate([line.get_ydata() for line in axis.lines])
         assert low < min(0, values.min())

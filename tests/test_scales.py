@@ -13,8 +13,7 @@ from neurosym.commands.common import taken_by
 from neurosym.experiments.imitation import reproduce_study
 from neurosym.experiments.journal import Journal
 from neurosym.experiments.reproduce import soma_experiment
-from neurosym.experiments.studies import study, study_names
-from neurosym.experiments.study_scales import SCALES
+from neurosym.experiments.studies import SCALES, study, study_names
 
 
 @pytest.mark.parametrize("scale", SCALES)

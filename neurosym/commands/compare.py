@@ -142,13 +142,13 @@ def _scores(comparison: Comparison, *, asked: bool, workers: int) -> tuple[Compa
 
 
 def _write(outcome: Outcome, table: list[Row], folder: Path) -> None:
-    from neurosym.experiments.reporting import report, write_csv
-    from neurosym.plotting import iterations_figure, save
+    from neurosym.experiments.reporting import figure_of, report, write_csv
+    from neurosym.plotting import save
     from neurosym.support.files import write_text
 
     write_csv(table, folder / "results.csv")
     write_text(folder / "results.md", report(outcome))
-    save(iterations_figure(outcome), folder / "iterations.png")
+    save(figure_of(outcome), folder / "iterations.png")
 
 
 def _show(outcome: Outcome, given: list[Row], family: ProblemFamily, folder: Path | None) -> None:

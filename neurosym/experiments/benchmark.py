@@ -10,26 +10,22 @@ import hashlib
 import zlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
+from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from neurosym import __version__
+from neurosym import __version__, pipeline
 from neurosym.errors import InputError
+from neurosym.experiments.baselines import best_fixed_order, order_fails
 from neurosym.experiments.engines import cores, run_tasks
-from neurosym.experiments.fixed_order import best_fixed_order, order_fails
 from neurosym.experiments.journal import Journal, key_of
 from neurosym.language.options import check_options
 from neurosym.language.problem_family import Progress
-from neurosym.language.search_problem import SearchProblem
-from neurosym.pipeline import ORACLES, open_oracle, search_and_check
 from neurosym.planning.planner import Budget
 from neurosym.planning.prior import OrderScores, Prior
 from neurosym.registry import load_domain, load_planner, load_prior
-
-if TYPE_CHECKING:
-    from neurosym.language.problem import Problem
 
 #: The name of planning without a prior, in tables and on the command line.
 NO_PRIOR = "none"
@@ -37,7 +33,10 @@ NO_PRIOR = "none"
 #: Raise it whenever the same comparison would give other runs, so that no journal answers for it.
 RUNS_VERSION = 3
 
+#: (planner, prior, seed)
 Cell = tuple[str, str, int]
+#: Prior -> its scores, one a problem.
+Scores = Mapping[str, Sequence[OrderScores] | None]
 
 
 @dataclass(frozen=True)
@@ -69,8 +68,8 @@ class Comparison:
             raise InputError("Expected at least one problem, one planner and one prior to compare; got none of one.")
         if self.seeds < 1:
             raise InputError(f"Expected at least 1 seed; got {self.seeds}.")
-        if self.oracle not in ORACLES:
-            raise InputError(f"Expected an oracle, one of {', '.join(ORACLES)}; got {self.oracle!r}.")
+        if self.oracle not in pipeline.ORACLES:
+            raise InputError(f"Expected an oracle, one of {', '.join(pipeline.ORACLES)}; got {self.oracle!r}.")
         check_options(load_domain(self.domain).problem, self.options, self.domain)
         for planner in self.planners:
             load_planner(planner)
@@ -129,48 +128,44 @@ def ask_priors(
 
     Args:
         loaded: priors that are loaded already, by their names in the comparison.
-        leave_out: called with the name of a prior that does not know these problems, and what it said; the prior is
+        leave_out: called with the name of a prior that does not know these problems, and the error; the prior is
             then missing in the answer. None lets the error pass.
         progress: called with (done, total) pictures.
     """
+    scores: dict[str, list[OrderScores] | None] = {}
+    asked = set(comparison.priors) - {NO_PRIOR}
     family = load_domain(comparison.domain)
-    found: dict[str, list[OrderScores] | None] = {}
-    problems: list[Problem] | None = None
+    problems = [family.problem(n, **comparison.options) for n in comparison.numbers] if asked else []
+    # Whether a prior looks at pictures is its own business; these two are known not to.
+    if asked - {"uniform", "random"}:
+        problems = family.observed(problems, workers=workers, progress=progress)
     for name in comparison.priors:
-        if name == NO_PRIOR:
-            found[name] = None
-            continue
-        if problems is None:
-            problems = [family.problem(n, **comparison.options) for n in comparison.numbers]
-            # Whether a prior looks at pictures is its own business; these two are known not to.
-            if set(comparison.priors) - {NO_PRIOR, "uniform", "random"}:
-                problems = family.observed(problems, workers=workers, progress=progress)
         try:
-            found[name] = load_prior((loaded or {}).get(name, name)).scores(problems)
+            prior = None if name == NO_PRIOR else load_prior((loaded or {}).get(name, name))
+            scores[name] = None if prior is None else prior.scores(problems)
         except InputError as error:
             if leave_out is None:
                 raise
             leave_out(name, error)
-    return found
+    return scores
 
 
 def run(
     comparison: Comparison,
-    scores: Mapping[str, Sequence[OrderScores] | None] | None = None,
+    scores: Scores | None = None,
     *,
     workers: int | None = 1,
-    engine: str = "local",
-    address: str | None = None,
     journal: str | Path | None = None,
     progress: Progress | None = None,
+    **where: Any,
 ) -> tuple[Run, ...]:
     """All runs of a comparison; the same, times excepted, for any number of workers.
 
     Args:
         scores: what `ask_priors` gives; None asks.
-        workers, engine, address: where problems are solved, see `neurosym.experiments.engines.run_tasks`.
         journal: file (JSON lines) that keeps finished runs; those it has are not run again.
         progress: called with (done, total) runs.
+        workers, where: where problems are solved, see `neurosym.experiments.engines.run_tasks`.
 
     Raises:
         ContractError: a planner's plan does not survive its replay.
@@ -182,9 +177,7 @@ def run(
     for position, number in enumerate(comparison.numbers):
         own = {name: None if given is None else given[position] for name, given in scores.items()}
         keys = {cell: _key(comparison, cell, number, own[cell[1]]) for cell in comparison.cells}
-        for cell, key in keys.items():
-            if key in kept:
-                done[cell, number] = Run(**kept[key])
+        done |= {(cell, number): Run(**kept[key]) for cell, key in keys.items() if key in kept}
         missing = {cell: key for cell, key in keys.items() if key not in kept}
         if missing:
             jobs.append((comparison, number, missing, own))
@@ -192,11 +185,9 @@ def run(
     if progress is not None:
         progress(len(done), total)
     # Processes, not threads: FCL holds the interpreter's lock. Problems are rebuilt there; FCL's objects cannot travel.
-    solved = run_tasks(lambda job: _solve_one(*job), jobs, engine=engine, workers=workers, address=address)
-    for _, finished in solved:
+    for _, finished in run_tasks(lambda job: _solve_one(*job), jobs, workers=workers, **where):
         kept.add({key: asdict(result) for key, result in finished})
-        for _, result in finished:
-            done[(result.planner, result.prior, result.seed), result.number] = result
+        done |= {((r.planner, r.prior, r.seed), r.number): r for _, r in finished}
         if progress is not None:
             progress(len(done), total)
     return tuple(done[cell, number] for cell in comparison.cells for number in comparison.numbers)
@@ -218,7 +209,7 @@ def image_blind(comparison: Comparison, *, split: int = 0) -> tuple[float, tuple
         problem = family.problem(number, **comparison.options)
         if set(order) - set(problem.actions):
             return None
-        with open_oracle(problem, comparison.oracle) as search:
+        with pipeline.open_oracle(problem, comparison.oracle) as search:
             failures += order_fails(search, [problem.actions.index(a) for a in order])
     return failures / len(comparison.numbers), order
 
@@ -228,41 +219,29 @@ def _solve_one(
 ) -> list[tuple[str, Run]]:
     """All the missing runs of one problem, so that its geometry is computed once."""
     problem = load_domain(comparison.domain).problem(number, **comparison.options)
-    found = []
-    with open_oracle(problem, comparison.oracle) as search:
-        first = _FirstOrders(search, number, scores)
-        for (planner, prior, seed), key in cells.items():
-            own = scores[prior]
-            own = None if own is None else own.restricted(problem.actions) if own.actions else own
-            rng = np.random.default_rng([seed, number, zlib.crc32(planner.encode()), zlib.crc32(prior.encode())])
-            [result] = search_and_check(
-                problem, search, load_planner(planner), own, budget=comparison.budget, rng=rng, oracle=comparison.oracle
-            )
+    advice = {prior: pipeline.advice(problem, own) for prior, own in scores.items()}
+    given: dict[str, Any] = {"budget": comparison.budget, "oracle": comparison.oracle}
+    runs = []
+    with pipeline.open_oracle(problem, comparison.oracle) as search:
+
+        @cache
+        def first_order_failed(prior: str, seed: int) -> bool:
+            """Asked by the benchmark itself, whatever planners do."""
+            rng, own = _generator(seed, number, "first order", prior), advice[prior]
+            order = rng.permutation(len(search.actions)).tolist() if own is None else own.order(rng)
+            return order_fails(search, order)
+
+        for (name, prior, seed), key in cells.items():
+            planner, rng = load_planner(name), _generator(seed, number, name, prior)
+            [result] = pipeline.search_and_check(problem, search, planner, advice[prior], rng=rng, **given)
             counts = (result.iterations, result.expansions, result.attempts, round(result.seconds, 7))
-            failed = first.failed(prior, seed)
-            found.append((key, Run(planner, prior, seed, number, result.status.name, *counts, failed)))
-    return found
+            failed = first_order_failed(prior, seed)
+            runs.append((key, Run(name, prior, seed, number, result.status.name, *counts, failed)))
+    return runs
 
 
-class _FirstOrders:
-    """Whether the order a prior would try first is refused: asked by the benchmark itself, whatever planners do."""
-
-    def __init__(self, search: SearchProblem[Any], number: int, scores: Mapping[str, OrderScores | None]) -> None:
-        self.search, self.number, self.scores = search, number, scores
-        self.known: dict[tuple[str, int], bool] = {}
-
-    def failed(self, prior: str, seed: int) -> bool:
-        if (prior, seed) not in self.known:
-            rng = np.random.default_rng([seed, self.number, zlib.crc32(b"first order"), zlib.crc32(prior.encode())])
-            scores = self.scores[prior]
-            if scores is None:
-                order: Sequence[int] = [int(a) for a in rng.permutation(len(self.search.actions))]
-            elif scores.actions:
-                order = scores.restricted(self.search.actions).order(rng)
-            else:
-                order = scores.order(rng)
-            self.known[prior, seed] = order_fails(self.search, order)
-        return self.known[prior, seed]
+def _generator(seed: int, number: int, *names: str) -> np.random.Generator:
+    return np.random.default_rng([seed, number, *(zlib.crc32(name.encode()) for name in names)])
 
 
 def _key(comparison: Comparison, cell: Cell, number: int, scores: OrderScores | None) -> str:

@@ -2,38 +2,43 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from itertools import combinations
 
-from neurosym.experiments.published_claims import OF_OURS, OF_THE_PAPER, Claim
+from neurosym.experiments.hypotheses import OF_OURS, OF_THE_PAPER, Hypothesis
 from neurosym.experiments.study_results import Results
 
-#: Metrics in which our recipe is set against the paper's.
-COMPARED = ("whole_sequence", "whole_sequence_unseen", "per_step")
+#: Metrics in which our recipe is set against the paper's, as sentences name them.
+COMPARED = {
+    "whole_sequence": "whole sequences",
+    "whole_sequence_unseen": "whole sequences that were never demonstrated",
+    "per_step": "steps",
+}
+_BASELINES = {"blind": "best fixed answer"}
 
 
-def findings(results: Results, style: str) -> list[str]:
+def conclusions(results: Results, style: str) -> list[str]:
     """One sentence each, Markdown without bullets."""
     study = results.study
-    found = [*_order(results, style)]
+    sentences = _order(results, style)
     for metric in COMPARED:
-        found += _ours_ahead(results, style, metric)
+        sentences += _ours_ahead(results, style, metric)
     for baseline in study.baselines:
         for metric in ("whole_sequence", "per_step"):
-            found += _above(results, style, baseline, metric)
-    found += [s for claim in OF_THE_PAPER.get(study.name, ()) for s in _said(results, style, claim, "The paper: ")]
-    asked = f"Asked of `{study.ours}`: "
-    return found + [s for claim in OF_OURS.get(study.name, ()) for s in _said(results, style, claim, asked)]
+            sentences += _above(results, style, baseline, metric)
+    for who, hypotheses in (("The paper: ", OF_THE_PAPER), (f"Asked of `{study.ours}`: ", OF_OURS)):
+        for hypothesis in hypotheses.get(study.name, ()):
+            sentences += _tested(results, style, hypothesis, who)
+    return sentences
 
 
 def _order(results: Results, style: str) -> list[str]:
     """Whether the paper's methods come out in the paper's order, pair by pair."""
     study = results.study
-    published = {m: f["whole_sequence"] for m, f in (study.published or {}).items() if m in study.methods}
+    published = {m: own["whole_sequence"] for m, own in study.published.items() if m in study.methods}
     if len(published) < 2:
         return []
-    ranked, n = sorted(published, key=lambda m: published[m]), max(study.sizes)
-    means = {m: results.mean(style, m, n, "whole_sequence") or 0.0 for m in ranked}
+    ranked = sorted(published, key=lambda m: published[m])
+    means = {m: results.mean(style, m, max(study.sizes), "whole_sequence") or 0.0 for m in ranked}
     pairs = list(combinations(ranked, 2))
     # Both of a pair can be level: then it did not come out as in the paper, either.
     otherwise = [
@@ -43,85 +48,66 @@ def _order(results: Results, style: str) -> list[str]:
         if means[better] <= means[worse]
     ]
     own = " < ".join(f"{m} {means[m]:.3f}" for m in sorted(ranked, key=lambda m: means[m]))
-    said = " < ".join(f"{m} {published[m]:.2f}" for m in ranked)
+    orders = f"the paper's order: {own} (the paper: {' < '.join(f'{m} {published[m]:.2f}' for m in ranked)})."
     if not otherwise:
-        return [f"Whole sequences come out in the paper's order: {own} (the paper: {said})."]
-    kept = len(pairs) - len(otherwise)
+        return [f"Whole sequences come out in {orders}"]
     return [
-        f"Whole sequences do **not** come out in the paper's order: {own} (the paper: {said}). {kept} of its "
-        f"{len(pairs)} pairs do; otherwise: {'; '.join(otherwise)}."
+        f"Whole sequences do **not** come out in {orders} {len(pairs) - len(otherwise)} of its {len(pairs)} pairs do; "
+        f"otherwise: {'; '.join(otherwise)}."
     ]
 
 
 def _ours_ahead(results: Results, style: str, metric: str) -> list[str]:
     """Whether ours is ahead of each of the paper's methods, at each n."""
     study = results.study
-    others = [m for m in study.methods if m != study.ours]
+    others = {m: results.means(style, m, metric) for m in study.methods if m != study.ours}
     ahead: list[str] = []
     behind: list[str] = []
-    for n in study.sizes:
-        own = results.mean(style, study.ours, n, metric)
-        rivals = {m: v for m in others if (v := results.mean(style, m, n, metric)) is not None}
-        if own is None or not rivals:
+    for n, own in results.means(style, study.ours, metric).items():
+        rivals = {m: means[n] for m, means in others.items() if n in means}
+        if not rivals:
             continue
         best = max(rivals, key=lambda m: rivals[m])
-        at = f"{_at(n, study.sizes)}{own:.3f}"
+        at = f"{_at(results, n)}{own:.3f}"
         if own > rivals[best]:
-            seeds = list(
-                zip(results.values(style, study.ours, n, metric), results.values(style, best, n, metric), strict=False)
-            )
+            seeds = list(zip(*(results.values(style, m, n, metric) for m in (study.ours, best)), strict=False))
             won = sum(a > b for a, b in seeds)
             in_seeds = f", behind in {won} of {len(seeds)} seeds" if len(seeds) > 1 else ""
             ahead.append(f"{at}; next is `{best}`, {rivals[best]:.3f}{in_seeds}")
         else:
             level = [f"`{m}`, {v:.3f}" for m, v in rivals.items() if v >= own]
             behind.append(f"{at} against {', '.join(level)}")
-    name = _name(metric)
-    found = [f"`{study.ours}` is ahead of each of the paper's in {name} ({' | '.join(ahead)})."] if ahead else []
-    if behind:
-        found.append(f"`{study.ours}` is **not** ahead of each of the paper's in {name} ({' | '.join(behind)}).")
-    return found
+    verbs = {"is ahead": ahead, "is **not** ahead": behind}
+    name = COMPARED[metric]
+    return [f"`{study.ours}` {v} of each of the paper's in {name} ({' | '.join(at)})." for v, at in verbs.items() if at]
 
 
 def _above(results: Results, style: str, baseline: str, metric: str) -> list[str]:
     """Which methods are above a baseline, at which n."""
     study = results.study
-    line = {n: v for n in study.sizes if (v := results.mean(style, baseline, n, metric)) is not None}
-    parts: dict[str, list[str]] = {}
+    line = results.means(style, baseline, metric)
+    places: dict[str, list[str]] = {}
     for method in study.methods if line else ():
-        own = {n: v for n in line if (v := results.mean(style, method, n, metric)) is not None}
+        own = {n: v for n, v in results.means(style, method, metric).items() if n in line}
         above = [n for n in own if own[n] > line[n]]
         where = "always" if len(above) == len(own) else f"at n = {', '.join(map(str, above))}" if above else "nowhere"
         if len(study.sizes) == 1:
             where = "above" if above else "not above"
-        parts.setdefault(where, []).append(f"`{method}`")
-    if not parts:
+        places.setdefault(where, []).append(f"`{method}`")
+    if not places:
         return []
-    said = "; ".join(f"{where}: {', '.join(methods)}" for where, methods in parts.items())
-    heights = ", ".join(f"{_at(n, study.sizes)}{v:.3f}" for n, v in line.items())
-    return [f"Above the {_baseline_name(baseline)} in {_name(metric)} ({heights}): {said}."]
+    methods = "; ".join(f"{where}: {', '.join(names)}" for where, names in places.items())
+    heights = ", ".join(f"{_at(results, n)}{v:.3f}" for n, v in line.items())
+    return [f"Above the {_BASELINES.get(baseline, baseline)} in {COMPARED[metric]} ({heights}): {methods}."]
 
 
-def _said(results: Results, style: str, claim: Claim, who: str) -> list[str]:
-    answer = claim.check(results, style)
+def _tested(results: Results, style: str, hypothesis: Hypothesis, who: str) -> list[str]:
+    answer = hypothesis.test(results, style)
     if answer is None:
         return []
     holds, numbers = answer
-    return [f"{who}{claim.says} Here it **{'holds' if holds else 'does not hold'}**: {numbers}."]
+    return [f"{who}{hypothesis.statement} Here it **{'holds' if holds else 'does not hold'}**: {numbers}."]
 
 
-def _at(n: int, sizes: Sequence[int]) -> str:
-    return f"n = {n}: " if len(sizes) > 1 else ""
-
-
-def _name(metric: str) -> str:
-    names = {
-        "whole_sequence": "whole sequences",
-        "whole_sequence_unseen": "whole sequences that were never demonstrated",
-        "per_step": "steps",
-    }
-    return names[metric]
-
-
-def _baseline_name(baseline: str) -> str:
-    return {"memoriser": "memoriser", "blind": "best fixed answer"}.get(baseline, baseline)
+def _at(results: Results, n: int) -> str:
+    return f"n = {n}: " if len(results.study.sizes) > 1 else ""

@@ -13,20 +13,17 @@ from pathlib import Path
 from typing import Any
 
 from neurosym import __version__
+from neurosym.experiments.baselines import BASELINES
 from neurosym.experiments.engines import run_tasks
-from neurosym.experiments.imitation_report import report, write_results
 from neurosym.experiments.journal import Journal, key_of
-from neurosym.experiments.order_baselines import BASELINES
+from neurosym.experiments.order_accuracy import Counts, averages, classes_of, compare_orders, seen_in
 from neurosym.experiments.studies import Study, Trial, study, study_names
+from neurosym.experiments.study_report import report, write_results
 from neurosym.experiments.study_results import Results
-from neurosym.experiments.trials import run_trial
 from neurosym.language.problem_family import Progress
-from neurosym.registry import load_prior
+from neurosym.registry import load_domain, load_prior
 
 __all__ = ["Results", "Study", "Trial", "report", "reproduce_study", "run_trial", "study", "study_names"]
-
-#: Called with one line about what is going on.
-Say = Callable[[str], None]
 
 #: Raise it whenever the same trial would give other figures, so that no journal answers for it.
 TRIALS_VERSION = 3
@@ -36,51 +33,71 @@ def reproduce_study(
     given: Study,
     out: Path,
     *,
-    workers: int | None = 1,
-    engine: str = "local",
-    address: str | None = None,
     epochs: int | None = None,
-    say: Say = lambda _: None,
+    say: Callable[[str], None] = lambda _: None,
     progress: Progress = lambda done, total: None,
+    **where: Any,
 ) -> Results:
     """Run the trials that are not done yet; write results.csv, report.md and figures into `out`.
 
     Args:
-        workers, engine, address: where trials run, see `neurosym.experiments.engines.run_tasks`.
         epochs: None takes each recipe's.
-        say: told what is going on.
+        say: called with a line about what is going on.
         progress: called with (done, total) trials.
+        where: workers, engine and address: where trials run, see `neurosym.experiments.engines.run_tasks`.
     """
     journal = Journal(out / "trials.jsonl")
-    trials = given.trials()
-    keys = {t: _key(given, t, epochs) for t in trials}
-    missing = [t for t in trials if keys[t] not in journal]
-    say(f"{len(trials) - len(missing)} of {len(trials)} trials are done already.")
-    progress(len(trials) - len(missing), len(trials))
-    ran = run_tasks(lambda t: run_trial(t, given, epochs), missing, engine=engine, workers=workers, address=address)
-    for done, (trial, found) in enumerate(ran, len(trials) - len(missing) + 1):
-        journal.add({keys[trial]: found})
-        progress(done, len(trials))
-        figures = found["figures"]
-        say(
-            f"[{done}/{len(trials)}] {trial.method}, {trial.pictures} pictures, n = {trial.n}, seed {trial.seed}: "
-            f"{figures['whole_sequence']:.2f} whole, {figures['per_step']:.2f} a step"
-        )
-    results = Results.of(given, {t: journal[keys[t]] for t in trials})
+    keys = {trial: _key(given, trial, epochs) for trial in given.trials()}
+    missing = [trial for trial, key in keys.items() if key not in journal]
+    before, total = len(keys) - len(missing), len(keys)
+    say(f"{before} of {total} trials are done already.")
+    progress(before, total)
+    for done, (trial, result) in enumerate(
+        run_tasks(lambda trial: run_trial(trial, given, epochs), missing, **where), before + 1
+    ):
+        journal.add({keys[trial]: result})
+        progress(done, total)
+        what = f"{trial.method}, {trial.pictures} pictures, n = {trial.n}, seed {trial.seed}"
+        shares = "{whole_sequence:.2f} whole, {per_step:.2f} a step".format(**result["figures"])
+        say(f"[{done}/{total}] {what}: {shares}")
+    results = Results.of(given, {trial: journal[key] for trial, key in keys.items()})
     write_results(results, out)
     return results
+
+
+def run_trial(trial: Trial, given: Study, epochs: int | None = None) -> dict[str, Any]:
+    """Train and test one network, or calculate a baseline.
+
+    Returns:
+        What a journal keeps: ``"figures"``, metric -> mean over the test pictures, and ``"counts"``, as
+        `Counts.to_json` gives them (None for a baseline).
+    """
+    family = load_domain(given.domain)
+    learner: Any = None if trial.method in BASELINES else load_prior(trial.method)
+    common: dict[str, Any] = {"split": trial.seed, "style": trial.pictures, "seed": trial.seed}
+    recipe = "paper" if learner is None else getattr(learner, "labels", "full")
+    train = family.demonstrations("train", recipe=recipe, **common, **given.options(trial.n))
+    test = family.demonstrations(given.part, recipe="paper", **common, **given.test(trial.n))
+    seen = seen_in(train, test)
+    if learner is None:
+        return {"figures": averages(BASELINES[trial.method](train, test), seen), "counts": None}
+    changes = given.train.get(trial.method)
+    learner.fit(train, seed=trial.seed, epochs=epochs, **({"settings": changes} if changes else {}))
+    orders = learner.predict(test.pictures)
+    figures = averages(compare_orders(orders, test, classes_of(test)), seen)
+    figures["training_seconds"] = float(learner.header["training"]["seconds"])
+    return {"figures": figures, "counts": Counts.of(orders, test).to_json()}
 
 
 def _key(given: Study, trial: Trial, epochs: int | None) -> str:
     """A digest of all that decides a trial."""
     data = [given.domain, given.part, given.options(trial.n), given.test(trial.n)]
     training = [_settings(trial.method), dict(given.train.get(trial.method, {})), epochs]
-    return key_of(
-        {"trial": asdict(trial), "data": data, "training": training, "version": [__version__, TRIALS_VERSION]}
-    )
+    version = [__version__, TRIALS_VERSION]
+    return key_of({"trial": asdict(trial), "data": data, "training": training, "version": version})
 
 
 @cache
 def _settings(method: str) -> Any:
-    """How a method trains, as far as it says: one that was tuned is another."""
+    """How a method trains, where it tells: one that was tuned is another."""
     return None if method in BASELINES else getattr(load_prior(method), "settings", None)

@@ -27,15 +27,13 @@ class Journal:
     def __init__(self, path: str | Path | None) -> None:
         self.path = None if path is None else Path(path)
         self._entries: dict[str, dict[str, Any]] = {}
-        self._torn = False
-        if self.path is not None and self.path.exists():
-            content = self.path.read_bytes()
-            # A line may be whole and lack only its end.
-            self._torn = not content.endswith(b"\n") and bool(content)
-            for line in content.split(b"\n"):
-                # What a kill left half written is done again.
-                with contextlib.suppress(ValueError, KeyError, TypeError):
-                    self._keep(line)
+        content = self.path.read_bytes() if self.path is not None and self.path.exists() else b""
+        # A line may be whole and lack only its end.
+        self._torn = bool(content) and not content.endswith(b"\n")
+        for line in content.split(b"\n"):
+            # What a kill left half written is done again.
+            with contextlib.suppress(ValueError, KeyError, TypeError):
+                self._keep(line)
 
     def __contains__(self, key: str) -> bool:
         return key in self._entries
@@ -52,20 +50,17 @@ class Journal:
             return
         lines = [json.dumps({"key": key, "value": dict(value)}) for key, value in entries.items()]
         self.path.parent.mkdir(parents=True, exist_ok=True)
-        handle = os.open(self.path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o644)
-        try:
+        with open(self.path, "ab", buffering=0) as file:
             # Whatever was torn ends here, so that the next line begins on its own.
             left = memoryview((("\n" if self._torn else "") + "".join(line + "\n" for line in lines)).encode())
             while left:
-                left = left[os.write(handle, left) :]
-            os.fsync(handle)
-        finally:
-            os.close(handle)
+                left = left[file.write(left) :]
+            os.fsync(file.fileno())
         self._torn = False
         for line in lines:
             self._keep(line)
 
     def _keep(self, line: str | bytes) -> None:
-        """Remember what a line says; so a value is the same now and when it is read again after a kill."""
+        """Remember what a line holds; so a value is the same now and when it is read again after a kill."""
         entry = json.loads(line)
         self._entries[entry["key"]] = dict(entry["value"])

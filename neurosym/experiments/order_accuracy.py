@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,8 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from neurosym.errors import InputError
 from neurosym.language.demonstrations import Demonstrations
 
-#: How steps that are not taken are called, beside the classes.
-NONE = "none"
+Ints = NDArray[np.int64]
 
 
 def compare_orders(
@@ -32,9 +31,8 @@ def compare_orders(
         demonstrated steps that are right), `re_use` (an action comes twice), `stop_accuracy` (as many steps).
     """
     order = _checked(predicted, truth)
-    wanted = truth.sequences
-    right = kinds(order, classes) == kinds(wanted, classes)
-    taken = wanted >= 0
+    right = classes_at(order, classes) == classes_at(truth.sequences, classes)
+    taken = truth.sequences >= 0
     ordered = np.sort(order, axis=1)
     twice = ((ordered[:, 1:] == ordered[:, :-1]) & (ordered[:, 1:] >= 0)).any(axis=1)
     return {
@@ -45,11 +43,10 @@ def compare_orders(
     }
 
 
-def kinds(orders: NDArray[np.int64], classes: Sequence[int]) -> NDArray[np.int64]:
-    """int64 (M, T): the classes of the actions; -1 where there is none."""
-    kind = np.append(np.asarray(classes, dtype=np.int64), -1)  # index -1, no action, takes the last entry
-    found: NDArray[np.int64] = kind[orders]
-    return found
+def classes_at(orders: Ints, classes: Sequence[int]) -> Ints:
+    """int64 (M, T): the class of the action at each step; -1 where there is none."""
+    # Index -1, no action, takes the last entry.
+    return np.asarray(np.append(np.asarray(classes, dtype=np.int64), -1)[orders])
 
 
 def classes_of(given: Demonstrations) -> tuple[int, ...]:
@@ -59,8 +56,8 @@ def classes_of(given: Demonstrations) -> tuple[int, ...]:
 
 def seen_in(train: Demonstrations, test: Demonstrations) -> NDArray[np.bool_]:
     """bool (M,): which test sequences, of classes, are among those of the training."""
-    known = {row.tobytes() for row in kinds(train.sequences, classes_of(train))}
-    return np.array([row.tobytes() in known for row in kinds(test.sequences, classes_of(test))])
+    known = {row.tobytes() for row in classes_at(train.sequences, classes_of(train))}
+    return np.array([row.tobytes() in known for row in classes_at(test.sequences, classes_of(test))])
 
 
 def averages(figures: Mapping[str, NDArray[np.float64]], seen: NDArray[np.bool_]) -> dict[str, float]:
@@ -70,13 +67,13 @@ def averages(figures: Mapping[str, NDArray[np.float64]], seen: NDArray[np.bool_]
         figures: metric -> float64 (M,).
         seen: bool (M,).
     """
-    found = {metric: float(values.mean()) for metric, values in figures.items()}
+    means = {metric: float(values.mean()) for metric, values in figures.items()}
     for label, chosen in (("seen", seen), ("unseen", ~seen)):
-        found[f"{label}_share"] = float(chosen.mean())
+        means[f"{label}_share"] = float(chosen.mean())
         if chosen.any():
             for metric in ("whole_sequence", "per_step"):
-                found[f"{metric}_{label}"] = float(figures[metric][chosen].mean())
-    return found
+                means[f"{metric}_{label}"] = float(figures[metric][chosen].mean())
+    return means
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +83,7 @@ class Counts:
     Attributes:
         labels: the K names of the classes: colours, letters.
         members: how many actions each has.
-        confusion: int64 (K + 1, K + 1): steps by the class demonstrated and the class read; the last is `NONE`.
+        confusion: int64 (K + 1, K + 1): steps by the class demonstrated and the class read; the last is no step.
         right: int64 (T + 1, T + 1): pictures by the number of steps and of those that are right.
         repeats: int64 (T, 4): by how many actions are of a class that came before in the sequence: steps, wrong
             steps, pictures, wrong pictures.
@@ -94,9 +91,9 @@ class Counts:
 
     labels: tuple[str, ...]
     members: tuple[int, ...]
-    confusion: NDArray[np.int64]
-    right: NDArray[np.int64]
-    repeats: NDArray[np.int64]
+    confusion: Ints
+    right: Ints
+    repeats: Ints
 
     @classmethod
     def of(cls, predicted: ArrayLike, truth: Demonstrations) -> Counts:
@@ -104,44 +101,29 @@ class Counts:
         order, classes = _checked(predicted, truth), classes_of(truth)
         labels = _class_names(truth.actions, classes)
         k, steps = len(labels), order.shape[1]
-        read, wanted = kinds(order, classes), kinds(truth.sequences, classes)
-        confusion = np.zeros((k + 1, k + 1), dtype=np.int64)
-        np.add.at(confusion, (wanted, read), 1)  # -1, no action, is the last
+        read, wanted = classes_at(order, classes), classes_at(truth.sequences, classes)
         taken = wanted >= 0
         length = taken.sum(axis=1)
         correct = ((read == wanted) & taken).sum(axis=1)
-        right = np.zeros((steps + 1, steps + 1), dtype=np.int64)
-        np.add.at(right, (length, correct), 1)
         repeated = length - np.array([len(set(row[row >= 0])) for row in wanted])
         wrong = (read != wanted).any(axis=1)
+        confusion, right = (np.zeros((size, size), dtype=np.int64) for size in (k + 1, steps + 1))
         repeats = np.zeros((steps, 4), dtype=np.int64)
+        np.add.at(confusion, (wanted, read), 1)  # -1, no action, is the last
+        np.add.at(right, (length, correct), 1)
         np.add.at(repeats, repeated, np.stack([length, length - correct, np.ones_like(length), wrong], axis=1))
-        members = tuple(int(n) for n in np.bincount(classes, minlength=k))
-        return cls(labels, members, confusion, right, repeats)
+        return cls(labels, tuple(int(n) for n in np.bincount(classes, minlength=k)), confusion, right, repeats)
 
     @classmethod
-    def pooled(cls, given: Iterable[Counts]) -> Counts:
+    def pooled(cls, trials: Sequence[Counts]) -> Counts:
         """Those of several trials, added up."""
-        everyone = list(given)
-        first = everyone[0]
-        if len({(c.labels, c.members, c.right.shape) for c in everyone}) > 1:
+        if len({(c.labels, c.members, c.right.shape) for c in trials}) > 1:
             raise InputError("Expected counts of the same classes and steps to add up; got different ones.")
-        return cls(
-            first.labels,
-            first.members,
-            np.sum([c.confusion for c in everyone], axis=0),
-            np.sum([c.right for c in everyone], axis=0),
-            np.sum([c.repeats for c in everyone], axis=0),
-        )
+        sums = (np.sum([getattr(c, name) for c in trials], axis=0) for name in ("confusion", "right", "repeats"))
+        return cls(trials[0].labels, trials[0].members, *sums)
 
     def to_json(self) -> dict[str, Any]:
-        return {
-            "labels": list(self.labels),
-            "members": list(self.members),
-            "confusion": self.confusion.tolist(),
-            "right": self.right.tolist(),
-            "repeats": self.repeats.tolist(),
-        }
+        return {name: np.asarray(value).tolist() for name, value in vars(self).items()}
 
     @classmethod
     def from_json(cls, given: Mapping[str, Any]) -> Counts:
@@ -149,7 +131,7 @@ class Counts:
         return cls(tuple(given["labels"]), tuple(given["members"]), *arrays)
 
 
-def _checked(predicted: ArrayLike, truth: Demonstrations) -> NDArray[np.int64]:
+def _checked(predicted: ArrayLike, truth: Demonstrations) -> Ints:
     order = np.asarray(predicted, dtype=np.int64)
     if order.shape != truth.sequences.shape:
         raise InputError(f"Expected predicted orders of shape {truth.sequences.shape}; got {order.shape}.")

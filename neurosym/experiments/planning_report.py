@@ -9,18 +9,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pandas as pd
 
 from neurosym import __version__
-from neurosym.experiments.benchmark import Outcome, Run
-from neurosym.experiments.csv_lines import Record, write_records
-from neurosym.experiments.reporting import provenance
-from neurosym.plotting import Panel, iterations_figure, points_figure, save_both
+from neurosym.experiments.benchmark import Outcome
+from neurosym.experiments.reporting import figure_of, markdown_table, provenance, spread, values_by, write_records
+from neurosym.plotting import Panel, points_figure, save_both
 from neurosym.registry import load_domain
 from neurosym.support.files import write_text
 
 if TYPE_CHECKING:
     from neurosym.experiments.reproduce import Experiment
-    from neurosym.plotting import Figure
+    from neurosym.plotting.style import Figure
 
 #: The planner that the paper has: its figures stand beside this one's.
 PAPERS_PLANNER = "swap-repair"
@@ -34,7 +34,7 @@ _NOTES = {
 
 
 def write_results(
-    experiment: Experiment, records: Sequence[Record], outcomes: Mapping[tuple[str, int], Outcome], out: Path
+    experiment: Experiment, records: pd.DataFrame, outcomes: Mapping[tuple[str, int], Outcome], out: Path
 ) -> None:
     """Write results.csv, report.md, and the figures, each as PNG and SVG, into `out`.
 
@@ -45,27 +45,24 @@ def write_results(
     figures: dict[str, list[tuple[str, str]]] = {}
     for style in experiment.styles:
         own = [outcomes[style, split] for split in range(experiment.splits)]
-        runs: tuple[Run, ...] = tuple(r for o in own for r in o.runs)
-        numbers = tuple(n for o in own for n in o.comparison.numbers)
-        pooled = Outcome(replace(own[0].comparison, numbers=numbers), runs)
-        each = methods_figure(experiment, records, style)
-        made = {
-            f"methods-{style}": (each, "Each split, their means, and the paper's"),
-            f"iterations-{style}": (iterations_figure(pooled), "Distribution of iterations, all splits"),
-        }
-        for name, (figure, _) in made.items():
-            save_both(figure, out / name)
-        figures[style] = [(name, caption) for name, (_, caption) in made.items()]
+        numbers = tuple(n for each in own for n in each.comparison.numbers)
+        pooled = Outcome(replace(own[0].comparison, numbers=numbers), tuple(run for each in own for run in each.runs))
+        save_both(methods_figure(experiment, records, style), out / f"methods-{style}")
+        save_both(figure_of(pooled), out / f"iterations-{style}")
+        figures[style] = [
+            (f"methods-{style}", "Each split, their means, and the paper's"),
+            (f"iterations-{style}", "Distribution of iterations, all splits"),
+        ]
     write_text(out / "report.md", report(experiment, records, figures))
 
 
-def methods_figure(experiment: Experiment, records: Sequence[Record], style: str) -> Figure:
+def methods_figure(experiment: Experiment, records: pd.DataFrame, style: str) -> Figure:
     """Initial failures, and iterations with every planner: a row a method, a dot a split."""
-    rows = [*experiment.methods, "random", BLIND]
-    paper = _published(experiment)
+    rows, paper = [*experiment.methods, "random", BLIND], _published(experiment)
+    known = values_by(records, "pictures", "method", "metric")
 
     def values(metric: str, scale: float = 1) -> dict[str, list[float]]:
-        return {row: [scale * v for v in _values(records, style, row, metric)] for row in rows}
+        return {row: [scale * v for v in known.get((style, row, metric), ())] for row in rows}
 
     failures = {m: own["initial_failures"] for m, own in paper.items() if own.get("initial_failures")}
     panels = [Panel("initial\nfailures (%)", values("initial_failures", 100), failures, (0, 100))]
@@ -73,20 +70,19 @@ def methods_figure(experiment: Experiment, records: Sequence[Record], style: str
         # The paper's deviation is over problems, ours over splits: beside each other they would mislead.
         means = {m: (own["iterations"][0], 0.0) for m, own in paper.items()} if planner == PAPERS_PLANNER else {}
         panels.append(Panel(f"iterations:\n{planner}", values(f"iterations {planner}"), means, None))
-    tested = {r.n for r in records if r.pictures == style}
-    title = f"{experiment.domain}, {style} pictures\n{max(tested)} test problems a split, {_splits(experiment)}"
+    tested = records.loc[records["pictures"] == style, "n"].max()
+    title = f"{experiment.domain}, {style} pictures\n{tested} test problems a split, {_splits(experiment)}"
     return points_figure(title, rows, panels, each="one split")
 
 
 def report(
-    experiment: Experiment, records: Sequence[Record], figures: Mapping[str, Sequence[tuple[str, str]]] | None = None
+    experiment: Experiment, records: pd.DataFrame, figures: Mapping[str, Sequence[tuple[str, str]]] | None = None
 ) -> str:
     """A page of Markdown: ours beside the paper's, means over splits with the deviation between splits.
 
     Args:
         figures: style -> (name of a figure beside the page, without ending, caption).
     """
-    published = _published(experiment)
     lines = [
         f"# {experiment.domain}",
         "",
@@ -96,67 +92,72 @@ def report(
         "fails least on the training half: it looks at no picture." + _NOTES.get(experiment.domain, ""),
     ]
     for style in experiment.styles:
-        columns = ["initial failures %", *(f"iterations, {p}" for p in experiment.planners), "training s"]
-        head = ["method", *columns, "paper: failures %", "paper: iterations"]
         lines += ["", f"## {experiment.domain}: {style} pictures", ""]
-        lines += [*(f"* {said}" for said in findings(experiment, records, style)), ""]
-        lines += [f"| {' | '.join(head)} |", "|" + "---|" * len(head)]
-        for method in (BLIND, "random", *experiment.methods):
-            paper = published.get(method, {})
-            row = [
-                _spread(_values(records, style, method, "initial_failures"), 100, 1),
-                *(_spread(_values(records, style, method, f"iterations {p}"), 1, 3) for p in experiment.planners),
-                _spread(_values(records, style, method, "training_seconds"), 1, 0),
-                _pair(paper.get("initial_failures")),
-                _pair(paper.get("iterations")),
-            ]
-            lines.append(f"| {method} | " + " | ".join(row) + " |")
+        lines += [*(f"* {sentence}" for sentence in conclusions(experiment, records, style)), ""]
+        lines += _table(experiment, records, style)
         for name, caption in (figures or {}).get(style, ()):
             lines += ["", f"![{caption}, {style} pictures]({name}.png)"]
     splits = f"splits 0 to {experiment.splits - 1}" if experiment.splits > 1 else "split 0"
-    said = f"{splits}, seed {experiment.seed}, each test problem planned {experiment.repeats} times"
-    return "\n".join([*lines, "", f"neurosym {__version__}, {said}; {provenance()}", ""])
+    runs = f"{splits}, seed {experiment.seed}, each test problem planned {experiment.repeats} times"
+    return "\n".join([*lines, "", f"neurosym {__version__}, {runs}; {provenance()}", ""])
 
 
-def findings(experiment: Experiment, records: Sequence[Record], style: str) -> list[str]:
+def _table(experiment: Experiment, records: pd.DataFrame, style: str) -> list[str]:
+    published, known = _published(experiment), values_by(records, "pictures", "method", "metric")
+    columns = ["initial failures %", *(f"iterations, {p}" for p in experiment.planners), "training s"]
+    lines = [["method", *columns, "paper: failures %", "paper: iterations"]]
+    for method in (BLIND, "random", *experiment.methods):
+        papers = [published.get(method, {}).get(key) for key in ("initial_failures", "iterations")]
+        row = [
+            spread(known.get((style, method, "initial_failures"), ()), 1, scale=100),
+            *(spread(known.get((style, method, f"iterations {p}"), ())) for p in experiment.planners),
+            spread(known.get((style, method, "training_seconds"), ()), 0),
+            *("" if pair is None else f"{pair[0]} ± {pair[1]}" for pair in papers),
+        ]
+        lines.append([method, *row])
+    return markdown_table(lines)
+
+
+def conclusions(experiment: Experiment, records: pd.DataFrame, style: str) -> list[str]:
     """What comes out, in sentences computed from the records; less is better in all of them."""
     measured = (
         ("initial_failures", "initial_failures", "initial failures (%)", 100),
         (f"iterations {PAPERS_PLANNER}", "iterations", f"iterations with {PAPERS_PLANNER}", 1),
     )
-    found = []
+    known = values_by(records, "pictures", "method", "metric")
+    sentences = []
     for metric, key, name, scale in measured:
         rows = (BLIND, "random", *experiment.methods)
-        own = {m: scale * float(np.mean(v)) for m in rows if (v := _values(records, style, m, metric))}
-        found += _against_the_paper(experiment, own, key, name)
+        own = {m: scale * float(np.mean(values)) for m in rows if (values := known.get((style, m, metric)))}
+        sentences += _against_the_paper(experiment, own, key, name)
         if BLIND in own:
-            better = [f"`{m}`" for m in experiment.methods if m in own and own[m] < own[BLIND]]
-            rest = [f"`{m}`" for m in experiment.methods if m in own and own[m] >= own[BLIND]]
-            parts = [f"less do {', '.join(better)}" if better else "", f"not less do {', '.join(rest)}" if rest else ""]
-            found.append(f"The best fixed order fails on {own[BLIND]:.1f}%; {', '.join(filter(None, parts))}.")
-    return found
+            less = ", ".join(f"`{m}`" for m in experiment.methods if m in own and own[m] < own[BLIND])
+            rest = ", ".join(f"`{m}`" for m in experiment.methods if m in own and own[m] >= own[BLIND])
+            parts = [f"less do {less}" if less else "", f"not less do {rest}" if rest else ""]
+            sentences.append(f"The best fixed order fails on {own[BLIND]:.1f}%; {', '.join(filter(None, parts))}.")
+    return sentences
 
 
 def _against_the_paper(experiment: Experiment, own: Mapping[str, float], key: str, name: str) -> list[str]:
     """Whether the paper's methods come out in its order, and which of the others are ahead of all of them."""
     paper = {m: row[key][0] for m, row in _published(experiment).items() if row.get(key) and m in own}
-    found = []
+    sentences = []
     ranked = sorted(paper, key=lambda m: -paper[m])
     if len(ranked) > 1:
         verb = "come out" if all(own[a] > own[b] for a, b in pairwise(ranked)) else "do **not** come out"
         here = " > ".join(f"{m} {own[m]:.2f}" for m in sorted(ranked, key=lambda m: -own[m]))
-        said = " > ".join(f"{m} {paper[m]:.2f}" for m in ranked)
-        found.append(f"The {name} {verb} in the paper's order: {here} (the paper: {said}).")
+        there = " > ".join(f"{m} {paper[m]:.2f}" for m in ranked)
+        sentences.append(f"The {name} {verb} in the paper's order: {here} (the paper: {there}).")
     theirs = {m: own[m] for m in paper if m in experiment.methods}
     if theirs:
         best = min(theirs, key=lambda m: theirs[m])
         for ours in (m for m in experiment.methods if m in own and m not in paper):
             verb = "is ahead of" if own[ours] < theirs[best] else "is **not** ahead of"
-            found.append(
+            sentences.append(
                 f"`{ours}` {verb} each of the paper's in {name}: {own[ours]:.2f}; the best of those is `{best}`, "
                 f"{theirs[best]:.2f}."
             )
-    return found
+    return sentences
 
 
 def _splits(experiment: Experiment) -> str:
@@ -166,19 +167,4 @@ def _splits(experiment: Experiment) -> str:
 def _published(experiment: Experiment) -> dict[str, Mapping[str, Any]]:
     """prior -> the family's published figures with the paper's planner."""
     rows = load_domain(experiment.domain).published
-    return {str(r["prior"]): r for r in rows if r["planner"] == PAPERS_PLANNER}
-
-
-def _values(records: Sequence[Record], style: str, method: str, metric: str) -> list[float]:
-    return [r.value for r in records if (r.pictures, r.method, r.metric) == (style, method, metric)]
-
-
-def _spread(values: Sequence[float], scale: float, digits: int) -> str:
-    if not values:
-        return ""
-    own = scale * np.array(values)
-    return f"{own.mean():.{digits}f}" + (f" ± {own.std():.{digits}f}" if len(own) > 1 else "")
-
-
-def _pair(value: tuple[float, float] | None) -> str:
-    return "" if value is None else f"{value[0]} ± {value[1]}"
+    return {str(row["prior"]): row for row in rows if row["planner"] == PAPERS_PLANNER}

@@ -1,8 +1,7 @@
-"""What a comparison says: one row a planner and prior, beside the published figures, as a table or as CSV."""
+"""Tables: of a comparison, one row a planner and prior, beside the published figures; and what all reports share."""
 
 from __future__ import annotations
 
-import csv
 import os
 import platform
 from collections.abc import Mapping, Sequence
@@ -11,15 +10,24 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pandas as pd
 
-from neurosym.experiments.benchmark import NO_PRIOR, Outcome, Run
+from neurosym.experiments.benchmark import NO_PRIOR, Outcome
+from neurosym.plotting import iterations_figure
 from neurosym.registry import load_domain
-from neurosym.support.files import replacing
+from neurosym.support.files import write_text
 
 if TYPE_CHECKING:
     from rich.table import Table
 
+    from neurosym.plotting.style import Figure
+
 Row = dict[str, Any]
+
+#: Columns of results.csv of the paper's experiments: a line a number.
+RECORD = ["experiment", "pictures", "method", "n", "seed", "metric", "value"]
+#: What is published of a planner and prior, each with its deviation.
+PUBLISHED = ("initial_failures", "iterations")
 
 
 def rows(outcome: Outcome) -> list[Row]:
@@ -31,38 +39,35 @@ def rows(outcome: Outcome) -> list[Row]:
     the planner, all runs together), seconds_mean; image_blind_failure_rate; published (the paper's figures, or None).
     """
     comparison = outcome.comparison
-    return [
-        _row(outcome, planner, prior, [r for r in outcome.runs if (r.planner, r.prior) == (planner, prior)])
-        for prior in comparison.priors
-        for planner in comparison.planners
-    ]
-
-
-def _row(outcome: Outcome, planner: str, prior: str, runs: Sequence[Run]) -> Row:
-    comparison = outcome.comparison
-    unsolved = {r.number for r in runs if not r.solved}
-    iterations = np.array([r.iterations for r in runs])
-    return {
-        "domain": comparison.domain,
-        "planner": planner,
-        "prior": prior,
-        "collapse": comparison.options.get("collapse"),
-        "oracle": comparison.oracle,
-        "problems": len(comparison.numbers),
-        "solved": len(comparison.numbers) - len(unsolved),
-        "seeds": comparison.seeds,
-        "runs": len(runs),
-        "runs_solved": sum(r.solved for r in runs),
-        "initial_failure_rate": float(np.mean([r.first_order_failed for r in runs])),
-        "iterations_mean": float(iterations.mean()),
-        "iterations_std": float(iterations.std()),
-        "expansions_mean": float(np.mean([r.expansions for r in runs])),
-        "attempts_mean": float(np.mean([r.attempts for r in runs])),
-        "seconds": float(np.sum([r.seconds for r in runs])),
-        "seconds_mean": float(np.mean([r.seconds for r in runs])),
-        "image_blind_failure_rate": outcome.image_blind,
-        "published": published(comparison.domain, planner, prior),
-    }
+    groups = pd.DataFrame(list(outcome.runs)).groupby(["planner", "prior"])
+    table = []
+    for prior in comparison.priors:
+        for planner in comparison.planners:
+            runs = groups.get_group((planner, prior))
+            solved = runs["status"] == "SOLVED"
+            row = {
+                "domain": comparison.domain,
+                "planner": planner,
+                "prior": prior,
+                "collapse": comparison.options.get("collapse"),
+                "oracle": comparison.oracle,
+                "problems": len(comparison.numbers),
+                "solved": len(comparison.numbers) - runs.loc[~solved, "number"].nunique(),
+                "seeds": comparison.seeds,
+                "runs": len(runs),
+                "runs_solved": int(solved.sum()),
+                "initial_failure_rate": float(runs["first_order_failed"].mean()),
+                "iterations_mean": float(runs["iterations"].mean()),
+                "iterations_std": float(runs["iterations"].std(ddof=0)),
+                "expansions_mean": float(runs["expansions"].mean()),
+                "attempts_mean": float(runs["attempts"].mean()),
+                "seconds": float(runs["seconds"].sum()),
+                "seconds_mean": float(runs["seconds"].mean()),
+                "image_blind_failure_rate": outcome.image_blind,
+                "published": published(comparison.domain, planner, prior),
+            }
+            table.append(row)
+    return table
 
 
 def published(domain: str, planner: str, prior: str) -> dict[str, Any] | None:
@@ -72,6 +77,20 @@ def published(domain: str, planner: str, prior: str) -> dict[str, Any] | None:
         if row["planner"] == planner and row["prior"] in names:
             return {k: v for k, v in row.items() if k not in ("planner", "prior")}
     return None
+
+
+def figure_of(outcome: Outcome) -> Figure:
+    """How many iterations each planner needs with each prior, beside the published means."""
+    comparison = outcome.comparison
+    counts: dict[str, dict[str, list[int]]] = {pl: {pr: [] for pr in comparison.priors} for pl in comparison.planners}
+    for run in outcome.runs:
+        counts[run.planner][run.prior].append(run.iterations)
+    cells = [(planner, prior) for planner in comparison.planners for prior in comparison.priors]
+    papers = {cell: (published(comparison.domain, *cell) or {}).get("iterations") for cell in cells}
+    what = [comparison.domain, str(comparison.options.get("collapse") or ""), comparison.oracle]
+    n = f"{len(comparison.numbers)} problems" + (f" × {comparison.seeds} seeds" if comparison.seeds > 1 else "")
+    title = f"{', '.join(filter(None, what))}: n = {n}"
+    return iterations_figure(title, counts, paper={cell: figures[0] for cell, figures in papers.items() if figures})
 
 
 def table(given: Sequence[Row]) -> Table:
@@ -90,38 +109,76 @@ def table(given: Sequence[Row]) -> Table:
 
 def cells(row: Mapping[str, Any]) -> tuple[str, ...]:
     """A row as text, in the order of the table."""
-    paper = row["published"] or {}
+    prior, paper = row["prior"], row["published"] or {}
     return (
         str(row["planner"]),
-        _short(row["prior"]),
+        Path(prior).name if prior.endswith(".safetensors") else prior,
         f"{row['runs_solved']}/{row['runs']}",
         f"{100 * row['initial_failure_rate']:.1f}",
         f"{row['iterations_mean']:.2f} ± {row['iterations_std']:.2f}",
         f"{row['expansions_mean']:.1f}",
         f"{row['attempts_mean']:.1f}",
         f"{1000 * row['seconds_mean']:.2f}",
-        _spread(paper.get("initial_failures")),
-        _spread(paper.get("iterations")),
+        *("{:.2f} ± {:.2f}".format(*pair) if pair else "" for pair in map(paper.get, PUBLISHED)),
     )
 
 
 def markdown(given: Sequence[Row]) -> str:
     """The rows as a Markdown table, for the README."""
     head = ("planner", "prior", "solved", "initial failures %", "iterations", "expansions", "attempts", "ms a problem")
-    lines = [(*head, "paper: failures %", "paper: iterations"), ("---",) * 10, *map(cells, given)]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines) + "\n"
+    papers = ("paper: failures %", "paper: iterations")
+    return "\n".join(markdown_table([(*head, *papers), *map(cells, given)], rule=" --- ")) + "\n"
 
 
 def report(outcome: Outcome) -> str:
     """The comparison as Markdown, with what a reader needs to repeat it: options, seeds, versions, machine."""
     comparison = outcome.comparison
     options = ", ".join(f"{key} {value}" for key, value in comparison.options.items())
-    said = f"{len(comparison.numbers)} problems x {comparison.seeds} seed(s) from 0; {options}; {comparison.oracle}."
+    text = f"{len(comparison.numbers)} problems x {comparison.seeds} seed(s) from 0; {options}; {comparison.oracle}."
     if outcome.image_blind is not None:
-        order = " ".join(outcome.image_blind_order)
-        failures = 100 * outcome.image_blind
-        said += f" The best fixed order ({order}), which looks at no picture, fails on {failures:.1f}%."
-    return f"{markdown(rows(outcome))}\n{said} {provenance()}\n"
+        order, failures = " ".join(outcome.image_blind_order), 100 * outcome.image_blind
+        text += f" The best fixed order ({order}), which looks at no picture, fails on {failures:.1f}%."
+    return f"{markdown(rows(outcome))}\n{text} {provenance()}\n"
+
+
+def write_csv(given: Sequence[Row], path: str | Path) -> Path:
+    """Write the rows as CSV, whole or not at all; the published mean and deviation are columns of their own."""
+    flat = []
+    for row in given:
+        plain = {key: value for key, value in row.items() if key != "published"}
+        for key in PUBLISHED:
+            mean, deviation = (row["published"] or {}).get(key) or (None, None)
+            plain |= {f"published_{key}_mean": mean, f"published_{key}_std": deviation}
+        flat.append(plain)
+    write_text(path, pd.DataFrame(flat, dtype=object).to_csv(index=False, lineterminator="\r\n"))
+    return Path(path)
+
+
+# -- what all reports share -----------------------------------------------------------------------------------
+
+
+def markdown_table(lines: Sequence[Sequence[str]], rule: str = "---") -> list[str]:
+    """The lines of a Markdown table; the first is its head."""
+    head, *body = (f"| {' | '.join(line)} |" for line in lines)
+    return [head, "|" + f"{rule}|" * len(lines[0]), *body]
+
+
+def values_by(records: pd.DataFrame, *columns: str) -> dict[tuple[Any, ...], list[float]]:
+    """What is in some columns of the lines of results.csv -> the values, in their order."""
+    return dict(records.groupby(list(columns))["value"].agg(list))
+
+
+def write_records(records: pd.DataFrame, path: Path) -> None:
+    """Write results.csv, whole or not at all."""
+    write_text(path, records.to_csv(index=False, lineterminator="\n"))
+
+
+def spread(values: Sequence[float], digits: int = 3, *, scale: float = 1) -> str:
+    """Mean and, of several values, their deviation (population); empty without values."""
+    own = scale * np.array(values)
+    if not len(own):
+        return ""
+    return f"{own.mean():.{digits}f}" + (f" ± {own.std():.{digits}f}" if len(own) > 1 else "")
 
 
 def provenance() -> str:
@@ -130,30 +187,3 @@ def provenance() -> str:
     versions = ", ".join(f"{name} {metadata.version(name)}" for name in names)
     machine = f"Python {platform.python_version()} on {platform.system()} {platform.machine()}, {os.cpu_count()} cores"
     return f"{versions}; {machine}."
-
-
-def write_csv(given: Sequence[Row], path: str | Path) -> Path:
-    """Write the rows as CSV, whole or not at all; the published mean and deviation are columns of their own."""
-    path = Path(path)
-    flat = []
-    for row in given:
-        paper = row["published"] or {}
-        plain = {k: v for k, v in row.items() if k != "published"}
-        for key in ("initial_failures", "iterations"):
-            mean, deviation = paper.get(key) or ("", "")
-            plain |= {f"published_{key}_mean": mean, f"published_{key}_std": deviation}
-        flat.append(plain)
-    with replacing(path) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, fieldnames=list(flat[0]))
-        writer.writeheader()
-        writer.writerows(flat)
-    return path
-
-
-def _short(prior: str) -> str:
-    """A weights file goes by its name."""
-    return Path(prior).name if prior.endswith(".safetensors") else prior
-
-
-def _spread(figures: Sequence[float] | None) -> str:
-    return "" if not figures else f"{figures[0]:.2f} ± {figures[1]:.2f}"

@@ -14,15 +14,15 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-import numpy as np
+import pandas as pd
 
 from neurosym import __version__
 from neurosym.errors import InputError, UnknownNameError
 from neurosym.experiments import benchmark
 from neurosym.experiments.benchmark import Comparison, Outcome
-from neurosym.experiments.csv_lines import Record
 from neurosym.experiments.engines import connection, cores, run_tasks
-from neurosym.experiments.planning_report import report, write_results
+from neurosym.experiments.planning_report import BLIND, report, write_results
+from neurosym.experiments.reporting import RECORD
 from neurosym.language.problem_family import Progress
 from neurosym.registry import load_domain, load_prior
 from neurosym.support.files import write_text, written_whole
@@ -31,6 +31,21 @@ __all__ = ["Cell", "Experiment", "report", "reproduce", "soma_experiment", "trai
 
 #: Called with one line about what is going on.
 Say = Callable[[str], None]
+
+#: What a scale changes; the paper splits the cubes 100 times.
+SCALES: Mapping[str, Mapping[str, Any]] = MappingProxyType({"quick": {"splits": 3}, "paper": {"splits": 100}})
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One training: a method on a style of pictures and a split."""
+
+    style: str
+    method: str
+    split: int
+
+    def path(self, out: Path) -> Path:
+        return out / "weights" / f"{self.style}-{self.method}-split{self.split}.safetensors"
 
 
 @dataclass(frozen=True)
@@ -63,9 +78,10 @@ class Experiment:
         if self.splits < 1 or not (self.styles and self.methods and self.planners):
             raise InputError("Expected at least one split, style, method and planner; got none of one.")
 
-
-#: The paper splits the cubes 100 times.
-SCALES: Mapping[str, Mapping[str, Any]] = MappingProxyType({"quick": {"splits": 3}, "paper": {"splits": 100}})
+    @property
+    def cells(self) -> list[Cell]:
+        splits = range(self.splits)
+        return [Cell(style, method, split) for split in splits for style in self.styles for method in self.methods]
 
 
 def soma_experiment(scale: str = "quick") -> Experiment:
@@ -79,62 +95,49 @@ def soma_experiment(scale: str = "quick") -> Experiment:
     return Experiment("soma", **SCALES[scale])
 
 
-@dataclass(frozen=True)
-class Cell:
-    """One training: a method on a style of pictures and a split."""
-
-    style: str
-    method: str
-    split: int
-
-    def path(self, out: Path) -> Path:
-        return out / "weights" / f"{self.style}-{self.method}-split{self.split}.safetensors"
-
-
 def reproduce(
     experiment: Experiment,
     out: Path,
     *,
-    workers: int | None = 1,
     engine: str = "local",
     address: str | None = None,
     say: Say = lambda _: None,
     progress: Progress = lambda done, total: None,
-) -> list[Record]:
-    """Train what is not trained yet, compare, and write results.csv, report.md and iterations.png into `out`.
+    **where: Any,
+) -> pd.DataFrame:
+    """Train what is not trained yet, compare, and write results.csv, report.md and figures into `out`.
 
     Args:
-        workers, engine, address: where networks are trained and problems solved, see `engines.run_tasks`.
-        say: told what is going on.
+        engine, address, where: where networks are trained and problems solved, see `engines.run_tasks`.
+        say: called with a line about what is going on.
         progress: called with (done, total) trainings and comparisons.
+
+    Returns:
+        The lines of results.csv.
     """
     _same_experiment(experiment, out)
-    cells = [
-        Cell(style, method, split)
-        for split in range(experiment.splits)
-        for style in experiment.styles
-        for method in experiment.methods
-    ]
+    cells = experiment.cells
     total = len(cells) + experiment.splits * len(experiment.styles)
-    missing = [c for c in cells if not c.path(out).exists()]
-    say(f"{len(cells) - len(missing)} of {len(cells)} networks are trained already.")
-    progress(len(cells) - len(missing), total)
-    records: list[Record] = []
+    missing = [cell for cell in cells if not cell.path(out).exists()]
+    done = len(cells) - len(missing)
+    say(f"{done} of {len(cells)} networks are trained already.")
+    progress(done, total)
     outcomes: dict[tuple[str, int], Outcome] = {}
+    where |= {"engine": engine, "address": address}
     with connection(engine, address):
-        run = partial(run_tasks, engine=engine, workers=workers, address=address)
         if engine == "local":
             _make_demonstrations(experiment, missing, say)
-        for done, line in enumerate(_train_all(experiment, missing, out, run, keep=engine == "local"), 1):
-            say(f"[{len(cells) - len(missing) + done}/{len(cells)}] {line}")
-            progress(len(cells) - len(missing) + done, total)
+        for line in _train_all(experiment, missing, out, partial(run_tasks, **where), keep=engine == "local"):
+            done += 1
+            say(f"[{done}/{len(cells)}] {line}")
+            progress(done, total)
         for style in experiment.styles:
             for split in range(experiment.splits):
-                outcome = _compare(experiment, style, split, out, engine=engine, workers=workers, address=address)
-                outcomes[style, split] = outcome
-                records += _records(experiment, outcome, style, split, out)
+                outcomes[style, split] = _compare(experiment, style, split, out, **where)
                 say(f"{style} pictures, split {split}: compared.")
                 progress(len(cells) + len(outcomes), total)
+    lines = [line for (style, split), each in outcomes.items() for line in _lines(experiment, each, style, split, out)]
+    records = pd.DataFrame(lines, columns=RECORD)
     write_results(experiment, records, outcomes, out)
     return records
 
@@ -185,60 +188,47 @@ def _make_demonstrations(experiment: Experiment, missing: Sequence[Cell], say: S
 
 
 def _recipe(method: str) -> str:
-    """The recipe of demonstrations that a method learns from, as its prior says."""
+    """The recipe of demonstrations that a method learns from."""
     return str(getattr(load_prior(method), "labels", "full"))
 
 
 def _compare(
-    experiment: Experiment,
-    style: str,
-    split: int,
-    out: Path,
-    *,
-    workers: int | None,
-    engine: str,
-    address: str | None,
+    experiment: Experiment, style: str, split: int, out: Path, *, workers: int | None = 1, **where: Any
 ) -> Outcome:
     family = load_domain(experiment.domain)
-    numbers = tuple(family.numbers("test", split=split))[: experiment.tests]
     comparison = Comparison(
         domain=experiment.domain,
-        numbers=numbers,
+        numbers=tuple(family.numbers("test", split=split))[: experiment.tests],
         planners=experiment.planners,
         priors=("random", *experiment.methods),
         options={"pictures": style, "seed": experiment.seed},
         seeds=experiment.repeats,
     )
-    here = min(workers or cores(), cores())
-    problems = family.observed([family.problem(n, **comparison.options) for n in numbers], workers=here)
-    scores = {m: load_prior(Cell(style, m, split).path(out)).scores(problems) for m in experiment.methods}
-    scores["random"] = load_prior("random").scores(problems)
+    trained = {method: load_prior(Cell(style, method, split).path(out)) for method in experiment.methods}
+    scores = benchmark.ask_priors(comparison, workers=min(workers or cores(), cores()), loaded=trained)
     journal = out / f"runs-{style}-{split}.jsonl"
-    runs = benchmark.run(comparison, scores, workers=workers, engine=engine, address=address, journal=journal)
+    runs = benchmark.run(comparison, scores, workers=workers, journal=journal, **where)
     blind = benchmark.image_blind(comparison, split=split)
     return Outcome(comparison, runs, *(blind or (None, ())))
 
 
-def _records(experiment: Experiment, outcome: Outcome, style: str, split: int, out: Path) -> list[Record]:
-    found = []
-    n = len(outcome.comparison.numbers)
-
-    def add(method: str, metric: str, value: Any) -> None:
-        found.append(Record(experiment.domain, style, method, n, split, metric, float(value)))
-
-    for method in outcome.comparison.priors:
-        runs = [r for r in outcome.runs if r.prior == method]
-        add(method, "initial_failures", np.mean([r.first_order_failed for r in runs]))
-        for planner in experiment.planners:
-            own = [r.iterations for r in runs if r.planner == planner]
-            add(method, f"iterations {planner}", np.mean(own))
-            add(method, f"iterations_std {planner}", np.std(own))
+def _lines(
+    experiment: Experiment, outcome: Outcome, style: str, split: int, out: Path
+) -> Iterator[tuple[Any, ...]]:
+    """The lines of results.csv of one comparison."""
+    figures: dict[tuple[str, str], float] = {}
+    for method, runs in pd.DataFrame(list(outcome.runs)).groupby("prior", sort=False):
+        figures[method, "initial_failures"] = runs["first_order_failed"].mean()
+        for planner, counts in runs.groupby("planner", sort=False)["iterations"]:
+            figures[method, f"iterations {planner}"] = counts.mean()
+            figures[method, f"iterations_std {planner}"] = counts.std(ddof=0)
         if method in experiment.methods:
             header = load_prior(Cell(style, method, split).path(out)).header  # type: ignore[attr-defined]
-            add(method, "training_seconds", header["training"]["seconds"])
+            figures[method, "training_seconds"] = header["training"]["seconds"]
     if outcome.image_blind is not None:
-        add("blind", "initial_failures", outcome.image_blind)
-    return found
+        figures[BLIND, "initial_failures"] = outcome.image_blind
+    for (method, metric), value in figures.items():
+        yield experiment.domain, style, method, len(outcome.comparison.numbers), split, metric, float(value)
 
 
 def _same_experiment(experiment: Experiment, out: Path) -> None:

@@ -4,27 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from neurosym.experiments.order_accuracy import Counts
+from neurosym import plotting
 from neurosym.experiments.study_results import Results
-from neurosym.plotting import (
-    Curves,
-    Panel,
-    Spread,
-    classes_figure,
-    confusion_figure,
-    curves_figure,
-    density_figure,
-    points_figure,
-    repeats_figure,
-    save_both,
-)
+from neurosym.plotting import Curves, Panel, Spread
 
 if TYPE_CHECKING:
-    from neurosym.plotting import Figure
+    from neurosym.plotting.style import Figure
 
 #: Classes above which each method's confusion matrix is a figure of its own.
 LARGE = 10
@@ -48,23 +36,13 @@ def figures(results: Results) -> Iterator[Drawn]:
                 yield replace(drawn, shown=drawn.shown and style == results.study.pictures[-1])
 
 
-def write_figures(results: Results, out: Path) -> list[Drawn]:
-    """Save each as PNG and SVG into `out`; returns what was drawn."""
-    written = []
-    for drawn in figures(results):
-        save_both(drawn.figure, out / drawn.name)
-        written.append(drawn)
-    return written
-
-
 def _shares(results: Results, style: str) -> Iterator[Drawn]:
     study, n = results.study, max(results.study.sizes)
-    rows = [*study.methods, *study.baselines]
-    published = study.published or {}
 
     def panel(title: str, metric: str) -> Panel:
-        paper = {m: (own[metric], own.get(f"{metric}_std", 0.0)) for m, own in published.items() if metric in own}
-        return Panel(title, {row: results.values(style, row, n, metric) for row in rows}, paper)
+        papers = study.published.items()
+        paper = {m: (own[metric], own.get(f"{metric}_std", 0.0)) for m, own in papers if metric in own}
+        return Panel(title, {row: results.values(style, row, n, metric) for row in study.rows}, paper)
 
     metrics = {
         "whole_sequence": "whole\nsequence",
@@ -73,66 +51,70 @@ def _shares(results: Results, style: str) -> Iterator[Drawn]:
         "re_use": "sequences\nwith re-use",
     }
     panels = [panel(title, metric) for metric, title in metrics.items()]
-    figure = points_figure(_title(results, style, n), rows, panels)
+    figure = plotting.points_figure(_title(results, style, n), study.rows, panels)
     yield Drawn(f"shares-{style}", "Shares of test sequences, and of their steps, a row a method", figure)
 
 
 def _density(results: Results, style: str) -> Iterator[Drawn]:
     study, n = results.study, max(results.study.sizes)
     seeds = {m: results.values(style, m, n, "whole_sequence") for m in study.methods}
-    counts = _counts(results, style, n)
-    paper = {m: f["whole_sequence"] for m, f in (study.published or {}).items() if "whole_sequence" in f}
-    figure = density_figure(_title(results, style, n), seeds, counts, paper)
+    paper = {m: own["whole_sequence"] for m, own in study.published.items() if "whole_sequence" in own}
+    figure = plotting.density_figure(_title(results, style, n), seeds, _counts(results, style, "right"), paper)
     yield Drawn(f"density-{style}", "How precision is distributed over seeds and over sequences", figure)
 
 
 def _curves(results: Results, style: str) -> Iterator[Drawn]:
     study = results.study
-    rows = [*study.methods, *study.baselines]
     metrics = {"per_step": "steps right", "whole_sequence": "whole sequence"}
     if results.lengths_vary:
         metrics["stop_accuracy"] = "length right"
     panels = [
-        Curves(title, {m: {n: results.values(style, m, n, metric) for n in study.sizes} for m in rows})
+        Curves(title, {m: {n: results.values(style, m, n, metric) for n in study.sizes} for m in study.rows})
         for metric, title in metrics.items()
     ]
     spread = None
     if study.ours in study.methods:
-        spread = Spread(study.ours, {n: results.counts[style, study.ours, n] for n in study.sizes})
+        spread = Spread(study.ours, {n: results.counts[style, study.ours, n].right for n in study.sizes})
     # Sizes that double want a logarithmic axis.
     log = len(study.sizes) > 2 and study.what == "demonstrations"
-    figure = curves_figure(_title(results, style), study.what, panels, spread=spread, log=log)
-    said = f"Growing numbers of {study.what}; a band reaches from the worst seed to the best"
-    yield Drawn(f"curves-{style}", said, figure)
+    figure = plotting.curves_figure(_title(results, style), study.what, panels, spread=spread, log=log)
+    caption = f"Growing numbers of {study.what}; a band reaches from the worst seed to the best"
+    yield Drawn(f"curves-{style}", caption, figure)
 
 
 def _confusion(results: Results, style: str) -> Iterator[Drawn]:
-    n = max(results.study.sizes)
-    counts = _counts(results, style, n)
-    title = f"{_title(results, style, n)}\n% of what was demonstrated"
-    if max(len(own.labels) for own in counts.values()) <= LARGE:
-        yield Drawn(f"confusion-{style}", "What was read for what", confusion_figure(title, counts))
+    counts, labels = _counts(results, style, "confusion"), _labels(results, style)
+    title = f"{_title(results, style, max(results.study.sizes))}\n% of what was demonstrated"
+    if len(labels) <= LARGE:
+        yield Drawn(f"confusion-{style}", "What was read for what", plotting.confusion_figure(title, labels, counts))
         return
     for method, own in counts.items():
-        figure = confusion_figure(title, {method: own})
+        figure = plotting.confusion_figure(title, labels, {method: own})
         shown = method == results.study.ours
         yield Drawn(f"confusion-{style}-{method}", f"What {method} read for what", figure, shown)
 
 
 def _classes(results: Results, style: str) -> Iterator[Drawn]:
-    n = max(results.study.sizes)
-    figure = classes_figure(_title(results, style, n), _counts(results, style, n))
+    title, labels = _title(results, style, max(results.study.sizes)), _labels(results, style, with_members=True)
+    figure = plotting.classes_figure(title, labels, _counts(results, style, "confusion"))
     yield Drawn(f"classes-{style}", "Errors by what was demonstrated; in brackets how many there are of it", figure)
 
 
 def _repeats(results: Results, style: str) -> Iterator[Drawn]:
-    n = max(results.study.sizes)
-    figure = repeats_figure(_title(results, style, n), _counts(results, style, n))
+    title = _title(results, style, max(results.study.sizes))
+    figure = plotting.repeats_figure(title, _counts(results, style, "repeats"))
     yield Drawn(f"repeats-{style}", "Errors by the number of repetitions in a sequence", figure)
 
 
-def _counts(results: Results, style: str, n: int) -> dict[str, Counts]:
-    return {m: results.counts[style, m, n] for m in results.study.methods}
+def _counts(results: Results, style: str, what: str) -> dict[str, Any]:
+    """Method -> one array of its `Counts` at the greatest n."""
+    n = max(results.study.sizes)
+    return {m: getattr(results.counts[style, m, n], what) for m in results.study.methods}
+
+
+def _labels(results: Results, style: str, *, with_members: bool = False) -> list[str]:
+    first = results.counts[style, results.study.methods[0], max(results.study.sizes)]
+    return [f"{k} ({n})" if with_members else k for k, n in zip(first.labels, first.members)]
 
 
 def _title(results: Results, style: str, n: int | None = None) -> str:

@@ -2,10 +2,9 @@
 
 from typing import TYPE_CHECKING
 
-from neurosym.plotting.confusion import confusion_figure
 from neurosym.plotting.curves import Curves, Spread, curves_figure
 from neurosym.plotting.density import density_figure, kernel_density
-from neurosym.plotting.errors import classes_figure, repeats_figure
+from neurosym.plotting.errors import classes_figure, confusion_figure, repeats_figure
 from neurosym.plotting.graphs import blocking_figure, contact_figure
 from neurosym.plotting.iterations import LAST_BAR, iterations_figure
 from neurosym.plotting.learning import learning_figure

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
-from neurosym.experiments.order_accuracy import Counts
-from neurosym.plotting.style import COLUMN, SMALL, TITLE, look_of, tidy
+from neurosym.plotting.style import COLUMN, SMALL, TITLE, add_legend, look_of, tidy
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -34,10 +34,15 @@ class Curves:
 
 @dataclass(frozen=True)
 class Spread:
-    """How single sequences come out with growing n: one method's counts, n -> Counts."""
+    """How single sequences come out with growing n, of one method.
+
+    Attributes:
+        method: which.
+        right: n -> int64 (T + 1, T + 1), pictures by the number of steps and of those that are right.
+    """
 
     method: str
-    counts: Mapping[int, Counts] = field(default_factory=dict)
+    right: Mapping[int, NDArray[np.int64]]
 
 
 def curves_figure(
@@ -64,21 +69,18 @@ def curves_figure(
     if spread is not None:
         _bubbles(axes[-1], spread)
         axes[-1].set_ylabel("steps right in\none sequence", fontsize=TITLE)
-    sizes = sorted({n for panel in panels for values in panel.values.values() for n in values})
+    every = [values for panel in panels for values in panel.values.values()]
     for axis in axes:
         axis.set_ylim(-0.03, 1.05)
         axis.set_yticks([0, 0.5, 1], ["0", ".5", "1"])
         axis.grid(axis="y", color="0.9", lw=0.6)
         axis.set_axisbelow(True)
         tidy(axis)
-    _across(axes[-1], sizes, across, log)
-    seeds = max(
-        (len(own) for panel in panels for values in panel.values.values() for own in values.values()), default=0
-    )
+    _across(axes[-1], sorted({n for values in every for n in values}), across, log)
+    seeds = max((len(own) for values in every for own in values.values()), default=0)
     bands = "\nlines: means over seeds; bands: least to greatest" if seeds > 1 else ""
     figure.suptitle(f"{title}{bands}", fontsize=TITLE)
-    handles, labels = axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=2, fontsize=SMALL, frameon=False)
+    add_legend(figure, axes[0].get_legend_handles_labels()[0])
     return figure
 
 
@@ -98,12 +100,10 @@ def _curve(axis: Axes, method: str, position: int, values: Mapping[int, Sequence
 
 def _bubbles(axis: Axes, spread: Spread) -> None:
     look = look_of(spread.method)
-    for n, counts in spread.counts.items():
+    for n, counts in spread.right.items():
         shares: dict[float, float] = {}
-        for length, row in enumerate(counts.right):
-            for right, pictures in enumerate(row):
-                if pictures:
-                    shares[right / length] = shares.get(right / length, 0) + pictures / counts.right.sum()
+        for length, right in zip(*np.nonzero(counts)):
+            shares[right / length] = shares.get(right / length, 0) + counts[length, right] / counts.sum()
         areas = [90 * share for share in shares.values()]
         axis.scatter([n] * len(shares), list(shares), s=areas, color=look.colour, lw=0, clip_on=False)
     axis.set_title(f"{spread.method}, all seeds; area: share of sequences", fontsize=SMALL, loc="left", pad=5)

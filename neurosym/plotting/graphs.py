@@ -32,14 +32,8 @@ _WIDTH = COLUMN - 2 * _MARGIN
 _APART = 0.3  # between panels
 _CONTACT_LAYER = 0.7  # lines within a layer need room beside it
 _ONLY_TOGETHER = "#D55E00"
-_ARROW = {
-    "arrowstyle": "-|>,head_length=0.35,head_width=0.18",
-    "color": COLOURS[4],
-    "lw": 0.8,
-    "shrinkA": 0,
-    "shrinkB": 0.5,
-    "zorder": 3,
-}
+_HEAD = "-|>,head_length=0.35,head_width=0.18"
+_ARROW = {"arrowstyle": _HEAD, "color": COLOURS[4], "lw": 0.8, "shrinkA": 0, "shrinkB": 0.5, "zorder": 3}
 
 
 def blocking_figure(assembly: Assembly, directions: Directions = None, *, title: str = "assembly") -> Figure:
@@ -56,14 +50,14 @@ def blocking_figure(assembly: Assembly, directions: Directions = None, *, title:
     graph = assembly.blocking(directions)
     chosen = _one_way(graph)
     shown = chosen[:MOST_PANELS]
-    some = "" if len(chosen) == len(shown) else f"{len(shown)} of "
-    said = f"{title}: what blocks what\nn = {len(assembly)} parts, {some}{len(chosen)} directions with their opposites"
+    count = f"{len(shown)} of {len(chosen)}" if len(chosen) > len(shown) else f"{len(chosen)}"
+    heading = f"{title}: what blocks what\nn = {len(assembly)} parts, {count} directions with their opposites"
     if len(assembly) > MOST_NODES:
-        return blocking_matrices(said, graph, shown)
+        return blocking_matrices(heading, graph, shown)
     layouts = [_layered(graph.graph(d)) for d in shown]
     figure, axis = in_inches(sum(each.height + _APART for _, each, _ in layouts) + 0.72)
     top = figure.get_figheight()
-    _write_title(axis, said)
+    _write_title(axis, heading)
     top -= 0.42
     for d, (framed, layout, arrows) in zip(shown, layouts):
         axis.text(_MARGIN, top - 0.1, _in_words(graph, d), fontsize=SMALL, fontweight="bold", va="center")
@@ -94,15 +88,15 @@ def contact_figure(assembly: Assembly, *, title: str = "assembly") -> Figure:
         pair = pair if pair[::-1] not in areas else pair[::-1]
         areas[pair] = areas.get(pair, 0.0) + contact.area
     unit = f"{assembly.units}²" if assembly.units else "units of length²"
-    said = f"{title}: what touches what\nn = {len(assembly)} parts, {len(areas)} contacts; areas in {unit}"
+    heading = f"{title}: what touches what\nn = {len(assembly)} parts, {len(areas)} contacts; areas in {unit}"
     if len(assembly) > MOST_NODES:
-        return contact_matrix(said, assembly, areas, unit)
+        return contact_matrix(heading, assembly, areas, unit)
     graph = nx.Graph(list(areas))
     graph.add_nodes_from(assembly.names)
     roots = [GROUND] if GROUND in graph else [n for n in assembly.names if n in assembly.fixed] or [assembly.names[0]]
     layout = in_layers(_from(graph, roots)[::-1], list(areas), _WIDTH, apart=_CONTACT_LAYER)
     figure, axis = in_inches(layout.height + 0.85)
-    _write_title(axis, said)
+    _write_title(axis, heading)
     places = {name: (x + _MARGIN, y + 0.35) for name, (x, y) in layout.places.items()}
     largest = max(areas.values(), default=1.0)
     room = (_MARGIN, 0.25, COLUMN - _MARGIN, layout.height + 0.4)
@@ -128,11 +122,11 @@ def _one_way(graph: BlockingGraph) -> list[int]:
 
 def _in_words(graph: BlockingGraph, d: int) -> str:
     opposite = next((k for k, v in enumerate(graph.directions) if np.linalg.norm(v + graph.directions[d]) < 1e-9), None)
-    said = f"along {graph.describe(d)}" + (", into the ground" if graph.into_table[d] else "")
+    text = f"along {graph.describe(d)}" + (", into the ground" if graph.into_table[d] else "")
     if opposite is None:
-        return said
+        return text
     ground = ", and into the ground" if graph.into_table[opposite] else ""
-    return f"{said}  ({graph.describe(opposite)}: arrows the other way{ground})"
+    return f"{text}  ({graph.describe(opposite)}: arrows the other way{ground})"
 
 
 def _layered(graph: nx.DiGraph) -> tuple[list[tuple[str, ...]], Layout, list[tuple[str, str]]]:
@@ -170,12 +164,12 @@ def _from(graph: nx.Graph, roots: Sequence[str]) -> list[list[str]]:
 # -- drawing --------------------------------------------------------------------------------------------------
 
 
-def _write_title(axis: Axes, said: str) -> None:
-    axis.text(COLUMN / 2, axis.get_ylim()[1] - 0.06, said, fontsize=TITLE, ha="center", va="top", linespacing=1.3)
+def _write_title(axis: Axes, title: str) -> None:
+    axis.text(COLUMN / 2, axis.get_ylim()[1] - 0.06, title, fontsize=TITLE, ha="center", va="top", linespacing=1.3)
 
 
-def _write_note(axis: Axes, said: str) -> None:
-    axis.text(COLUMN / 2, 0.09, said, fontsize=SMALL, ha="center", va="center")
+def _write_note(axis: Axes, note: str) -> None:
+    axis.text(COLUMN / 2, 0.09, note, fontsize=SMALL, ha="center", va="center")
 
 
 def _join(axis: Axes, pair: tuple[str, str], places: Mapping[str, Point], bend: float, look: Mapping[str, Any]) -> None:
@@ -196,17 +190,9 @@ def _frame(axis: Axes, places: Sequence[tuple[float, float]], names: Sequence[st
     left = min(x - box_width(n) / 2 for (x, _), n in zip(places, names)) - 0.04
     right = max(x + box_width(n) / 2 for (x, _), n in zip(places, names)) + 0.04
     low, high = min(y for _, y in places) - BOX, max(y for _, y in places) + BOX
-    patch = FancyBboxPatch(
-        (left, low),
-        right - left,
-        high - low,
-        boxstyle="round,pad=0,rounding_size=0.06",
-        facecolor="#FBE6D8",
-        edgecolor=_ONLY_TOGETHER,
-        linewidth=1.0,
-        zorder=2,
-    )
-    axis.add_patch(patch)
+    look: dict[str, Any] = {"facecolor": "#FBE6D8", "edgecolor": _ONLY_TOGETHER, "linewidth": 1.0, "zorder": 2}
+    style = "round,pad=0,rounding_size=0.06"
+    axis.add_patch(FancyBboxPatch((left, low), right - left, high - low, boxstyle=style, **look))
 
 
 def _thickness(area: float, largest: float) -> float:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Protocol
 
 from neurosym.errors import InputError
-from neurosym.plotting.style import COLUMN, SMALL, TITLE, look_of, tidy
+from neurosym.plotting.style import COLUMN, TITLE, add_legend, look_of, mark, tidy
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -69,13 +69,11 @@ def learning_figure(
         line = {"color": look.colour, "lw": 1.2, "marker": look.marker, "ms": 3.5, "markevery": every}
         axis = axes[panels.index(kinds[method])]
         axis.plot([e.epoch for e in epochs], [e.train_loss for e in epochs], ":", **line)
-        losses = [(e.epoch, e.held_out_loss) for e in epochs]
-        held = [(epoch, value) for epoch, value in losses if value is not None]
-        axis.plot([x for x, _ in held], [y for _, y in held], "-", **line)
+        held = [e for e in epochs if e.held_out_loss is not None]
+        axis.plot([e.epoch for e in held], [e.held_out_loss for e in held], "-", **line)
         if measured:
-            shares = [(e.epoch, e.held_out_whole_order_accuracy) for e in epochs]
-            right = [(epoch, value) for epoch, value in shares if value is not None]
-            axes[-1].plot([x for x, _ in right], [y for _, y in right], "-", **line)
+            held = [e for e in epochs if e.held_out_whole_order_accuracy is not None]
+            axes[-1].plot([e.epoch for e in held], [e.held_out_whole_order_accuracy for e in held], "-", **line)
     for axis, kind in zip(axes, panels):
         axis.set_ylabel(kind, fontsize=TITLE)
         low, high = axis.get_ylim()
@@ -89,23 +87,13 @@ def learning_figure(
         axis.grid(axis="y", color="0.9", lw=0.6)
         axis.set_axisbelow(True)
         tidy(axis)
-    said = [f"{trained:,} demonstrations to learn from"] if trained else []
-    said += [f"{held_out:,} {'' if said else 'demonstrations '}held out"] if held_out and measured else []
-    figure.suptitle(f"{title}\nn = {', '.join(said)}" if said else title, fontsize=TITLE)
-    _legend(figure, list(runs), measured=measured)
-    return figure
-
-
-def _legend(figure: Figure, methods: Sequence[str], *, measured: bool) -> None:
-    """Below all panels, where it lies on no curve."""
-    from matplotlib.lines import Line2D
-
-    looks = [look_of(method, position) for position, method in enumerate(methods)]
-    handles = [
-        Line2D([], [], color=look.colour, lw=1.2, marker=look.marker, ms=3.5, label=method)
-        for look, method in zip(looks, methods)
-    ]
-    handles.append(Line2D([], [], ls=":", color="0.3", lw=1.2, label="in training"))
+    sizes = [f"{trained:,} demonstrations to learn from"] if trained else []
+    sizes += [f"{held_out:,} {'' if sizes else 'demonstrations '}held out"] if held_out and measured else []
+    figure.suptitle(f"{title}\nn = {', '.join(sizes)}" if sizes else title, fontsize=TITLE)
+    looks = [(method, look_of(method, position)) for position, method in enumerate(runs)]
+    marks = [mark(look.marker, method, ls="-", color=look.colour, lw=1.2, ms=3.5) for method, look in looks]
+    marks.append(mark("", "in training", ls=":", color="0.3", lw=1.2))
     if measured:
-        handles.append(Line2D([], [], ls="-", color="0.3", lw=1.2, label="held out"))
-    figure.legend(handles=handles, loc="outside lower center", ncols=3, fontsize=SMALL, frameon=False)
+        marks.append(mark("", "held out", ls="-", color="0.3", lw=1.2))
+    add_legend(figure, marks, columns=3)
+    return figure

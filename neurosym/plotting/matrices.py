@@ -71,9 +71,9 @@ def contact_matrix(title: str, assembly: Assembly, areas: Mapping[tuple[str, str
     largest = max(areas.values(), default=1.0)
     drawn = axis.imshow(table, cmap="viridis_r", vmin=0, vmax=largest, interpolation="nearest")
     if len(names) <= MOST_NAMES:
-        said = [shortened(name, _MOST_LETTERS) for name in names]
-        axis.set_xticks(range(len(names)), said, rotation=90)
-        axis.set_yticks(range(len(names)), said)
+        short = [shortened(name, _MOST_LETTERS) for name in names]
+        axis.set_xticks(range(len(names)), short, rotation=90)
+        axis.set_yticks(range(len(names)), short)
         axis.tick_params(length=0, pad=1, labelsize=_LETTERS)
     else:
         _dress(axis, len(names))
@@ -98,6 +98,6 @@ def _dress(axis: Axes, n: int) -> None:
     """Numbers from 1 on."""
     tidy(axis, sides=())
     ticks = [1, *range(10, n + 1, 10 * -(-n // 60))]
-    axis.set_xticks([t - 1 for t in ticks], [str(t) for t in ticks])
-    axis.set_yticks([t - 1 for t in ticks], [str(t) for t in ticks])
+    for set_ticks in (axis.set_xticks, axis.set_yticks):
+        set_ticks([t - 1 for t in ticks], [str(t) for t in ticks])
     axis.tick_params(length=2, pad=1)

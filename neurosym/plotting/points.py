@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from neurosym.plotting.style import COLUMN, SMALL, TITLE, look_of, tidy
+from neurosym.plotting.style import COLUMN, SMALL, TITLE, add_legend, look_of, mark, papers_mark, tidy
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -49,7 +49,10 @@ def points_figure(title: str, rows: Sequence[str], panels: Sequence[Panel], *, e
     axes[0].set_yticks(range(len(rows)), rows[::-1], fontsize=SMALL)
     axes[0].set_ylim(-0.6, len(rows) - 0.4)
     figure.suptitle(title, fontsize=TITLE)
-    _legend(figure, each, with_paper=any(set(panel.paper) & set(rows) for panel in panels))
+    marks = [mark("o", each, ms=3.2, mfc="none", mec="0.3"), mark("o", "mean", ms=5, mfc="0.3", mec="white")]
+    if any(set(panel.paper) & set(rows) for panel in panels):
+        marks.append(papers_mark("the paper's", ms=3.8))
+    add_legend(figure, marks, columns=3)
     return figure
 
 
@@ -66,26 +69,10 @@ def _draw(axis: Axes, rows: Sequence[str], panel: Panel) -> None:
                 axis.plot([mean - deviation, mean + deviation], [position + 0.24] * 2, color="0.4", lw=0.8, zorder=1)
             axis.plot(mean, position + 0.24, "D", ms=3.8, mfc="white", mec="black", mew=0.8, zorder=4, clip_on=False)
     axis.set_title(panel.title, fontsize=SMALL, pad=3)
-    if panel.limits is None:
-        axis.set_xlim(left=0)
-        axis.locator_params(axis="x", nbins=2)
+    axis.set_xlim(*(panel.limits or (0, None)))
+    if panel.limits == (0.0, 1.0):
+        axis.set_xticks([0, 0.5, 1], ["0", ".5", "1"])
     else:
-        axis.set_xlim(*panel.limits)
-        if panel.limits == (0.0, 1.0):
-            axis.set_xticks([0, 0.5, 1], ["0", ".5", "1"])
-        else:
-            axis.locator_params(axis="x", nbins=2)
+        axis.locator_params(axis="x", nbins=2)
     tidy(axis, sides=("top", "right", "left"))
     axis.tick_params(axis="y", length=0)
-
-
-def _legend(figure: Figure, each: str, *, with_paper: bool) -> None:
-    from matplotlib.lines import Line2D
-
-    handles = [
-        Line2D([], [], ls="", marker="o", ms=3.2, mfc="none", mec="0.3", label=each),
-        Line2D([], [], ls="", marker="o", ms=5, mfc="0.3", mec="white", label="mean"),
-    ]
-    if with_paper:
-        handles.append(Line2D([], [], ls="", marker="D", ms=3.8, mfc="white", mec="black", label="the paper's"))
-    figure.legend(handles=handles, loc="outside lower center", ncols=3, fontsize=SMALL, frameon=False)

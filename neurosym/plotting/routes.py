@@ -41,18 +41,16 @@ def bends(
     drawn: list[shapely.LineString] = []
     for a, b in pairs:
         others = [box for name, box in boxes.items() if name not in (a, b)]
-        best, least, kept = 0.0, np.inf, None
-        for bend in BENDS:
-            points = curve(places[a], places[b], bend)
-            line = shapely.LineString(points)
-            hits = int(shapely.intersects(line, others).sum()) if others else 0
-            crossed = int(shapely.crosses(line, drawn).sum()) if drawn else 0
-            outside = bool((points < (left, low)).any() or (points > (right, high)).any())
-            cost = _HIT * hits + _CROSS * crossed + _OUTSIDE * outside + _BENT * abs(bend)
-            if cost < least:
-                best, least, kept = bend, cost, line
-        chosen.append(best)
-        drawn.append(kept)
+        lines = [shapely.LineString(curve(places[a], places[b], bend)) for bend in BENDS]
+        costs = []
+        for bend, line in zip(BENDS, lines):
+            hits, crossed = shapely.intersects(line, others).sum(), shapely.crosses(line, drawn).sum()
+            x1, y1, x2, y2 = line.bounds
+            outside = x1 < left or y1 < low or x2 > right or y2 > high
+            costs.append(_HIT * hits + _CROSS * crossed + _OUTSIDE * outside + _BENT * abs(bend))
+        best = int(np.argmin(costs))
+        chosen.append(BENDS[best])
+        drawn.append(lines[best])
     return chosen
 
 
@@ -61,8 +59,7 @@ def curve(start: Point, end: Point, bend: float) -> Array:
     (x1, y1), (x2, y2) = start, end
     middle = np.array([(x1 + x2) / 2 + bend * (y2 - y1), (y1 + y2) / 2 - bend * (x2 - x1)])
     t = np.linspace(0, 1, _POINTS)[:, None]
-    found: Array = (1 - t) ** 2 * np.array(start) + 2 * t * (1 - t) * middle + t**2 * np.array(end)
-    return found
+    return np.asarray((1 - t) ** 2 * np.array(start) + 2 * t * (1 - t) * middle + t**2 * np.array(end))
 
 
 def _box(name: str, at: Point) -> object:

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from neurosym.planning.prior import OrderScores
+from neurosym.plotting.errors import write_shares
 from neurosym.plotting.labels import shortened, without_common
-from neurosym.plotting.style import COLOURS, COLUMN, SMALL, TITLE, tidy
+from neurosym.plotting.style import COLOURS, COLUMN, SMALL, TITLE, add_legend, mark, tidy
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -47,28 +48,27 @@ def scores_figure(
     figure = Figure(figsize=(COLUMN, rows * (tall + 0.3) + 0.85), layout="constrained")
     axes = figure.subplots(rows, columns, squeeze=False).ravel()
     norm = PowerNorm(0.5, vmin=0, vmax=1)
-    for k, axis in enumerate(axes):
-        if k >= len(given):
-            axis.remove()
-            continue
-        name, own = list(given.items())[k]
+    for axis in axes[len(given) :]:
+        axis.remove()
+    for k, (axis, (name, own)) in enumerate(zip(axes, given.items())):
         axis.imshow(np.exp(own.log_prob), cmap="Blues", norm=norm, aspect="auto")
         _mark(axis, own, plan)
         _dress(axis, own, first_column=k % columns == 0, last_row=k + columns >= len(given))
         axis.set_title(name, fontsize=SMALL, pad=3)
         if own.n_actions <= WRITTEN:
-            _write(axis, own, small=columns > 1)
+            write_shares(axis, np.exp(own.log_prob), _LETTERS if columns > 1 else 6.5)
     bar = figure.colorbar(ScalarMappable(norm, "Blues"), ax=list(axes[: len(given)]), aspect=30, pad=0.02)
     bar.ax.tick_params(labelsize=SMALL)
     bar.set_ticks([0, 0.1, 0.5, 1], labels=["0", ".1", ".5", "1"])
     bar.set_label("probability", fontsize=SMALL)
     figure.suptitle(f"{title}: n = {first.n_steps} steps × {first.n_actions} actions", fontsize=TITLE)
+    named = first.actions and first.n_actions <= MOST_NAMES
     for axis in axes[: len(given)][-columns:]:
-        axis.set_xlabel(
-            "action" if first.actions and first.n_actions <= MOST_NAMES else "action (number)", fontsize=TITLE
-        )
+        axis.set_xlabel("action" if named else "action (number)", fontsize=TITLE)
     figure.supylabel("step", fontsize=TITLE)
-    _legend(figure, with_plan=bool(plan))
+    marks = [mark("s", "likeliest order", mfc="none", mec=COLOURS[3], mew=1.3, ms=6)]
+    marks += [mark("o", "the plan", ms=3, mfc="white", mec="black")] if plan else []
+    add_legend(figure, marks)
     return figure
 
 
@@ -99,24 +99,5 @@ def _dress(axis: Axes, own: OrderScores, *, first_column: bool, last_row: bool) 
     axis.tick_params(axis="x", labelsize=SMALL if n <= 20 else _LETTERS)
     if own.log_length is not None:
         for step, log in enumerate(own.log_length[1:]):
-            said = f"{100 * np.exp(log):.0f}% ends"
-            axis.text(n - 0.4, step, said, fontsize=_LETTERS, va="center", ha="left", color="0.3")
-
-
-def _write(axis: Axes, own: OrderScores, *, small: bool) -> None:
-    for i, row in enumerate(np.exp(own.log_prob)):
-        for j, p in enumerate(row):
-            if p >= 0.005:  # what rounds to 0% is left out
-                colour = "white" if p > 0.3 else "black"
-                axis.text(
-                    j, i, f"{100 * p:.0f}", ha="center", va="center", fontsize=_LETTERS if small else 6.5, color=colour
-                )
-
-
-def _legend(figure: Figure, *, with_plan: bool) -> None:
-    from matplotlib.lines import Line2D
-
-    handles = [Line2D([], [], ls="", marker="s", mfc="none", mec=COLOURS[3], mew=1.3, ms=6, label="likeliest order")]
-    if with_plan:
-        handles.append(Line2D([], [], ls="", marker="o", ms=3, mfc="white", mec="black", label="the plan"))
-    figure.legend(handles=handles, loc="outside lower center", ncols=2, fontsize=SMALL, frameon=False)
+            text = f"{100 * np.exp(log):.0f}% ends"
+            axis.text(n - 0.4, step, text, fontsize=_LETTERS, va="center", ha="left", color="0.3")

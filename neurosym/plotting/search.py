@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from neurosym.planning.planner import PlanResult
 from neurosym.plotting.labels import shortened, width_of, without_common
-from neurosym.plotting.style import COLOURS, COLUMN, SMALL, TITLE
+from neurosym.plotting.style import COLOURS, COLUMN, TITLE, add_legend, mark, tidy
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -65,16 +65,22 @@ def search_figure(result: PlanResult, *, title: str = "search") -> Figure:
     axis.set_xlim(-0.3, steps + beyond / step)
     every = max(1, -(-steps // MOST_TICKS))
     axis.set_xticks(range(0, steps + 1, every))
-    axis.tick_params(labelsize=SMALL)
     axis.set_yticks([])
-    for side in ("top", "left", "right"):
-        axis.spines[side].set_visible(False)
+    tidy(axis, sides=("top", "left", "right"))
     axis.set_xlabel("steps done", fontsize=TITLE)
     cuts = [f"the first {drawn:,} of {len(result.blame):,} refusals"] if drawn < len(result.blame) else []
     cuts += ["names are left out"] if not named else [f"{left_out} names are left out"] if left_out else []
-    said = [f"{title}: {_ended(result)}", f"n = {_counts(result)}", *(["; ".join(cuts)] if cuts else [])]
-    figure.suptitle("\n".join(said), fontsize=TITLE)
-    _legend(figure, root, solved=result.solved)
+    ended = result.status.name.lower().replace("_", " ")
+    lines = [f"{title}: {ended}", f"n = {_counts(result)}", *(["; ".join(cuts)] if cuts else [])]
+    figure.suptitle("\n".join(lines), fontsize=TITLE)
+    nodes = list(_all(root))
+    marks = [mark("o", "the plan", ls="-", color=ON_PLAN, ms=4, lw=1.6)] if result.solved else []
+    if any(not node.on_plan for node in nodes):
+        label = "accepted, left" if result.solved else "accepted"
+        marks.append(mark("o", label, ls="-", color=LEFT, ms=3.2, lw=0.7))
+    if any(node.refused for node in nodes):
+        marks.append(mark("x", "refused", ls=":", color=REFUSED, ms=3.2, lw=0.6))
+    add_legend(figure, marks, columns=3)
     return figure
 
 
@@ -87,10 +93,6 @@ def _beyond(root: _Node, steps: int) -> float:
     """What names of refusals at the right edge need (inches)."""
     last = [shortened(name) for node in _all(root) if node.step == steps - 1 for name in node.refused]
     return 0.15 + max((width_of(name, _LETTERS) for name in last), default=0.0)
-
-
-def _ended(result: PlanResult) -> str:
-    return result.status.name.lower().replace("_", " ")
 
 
 def _tree(result: PlanResult) -> tuple[_Node, int]:
@@ -107,15 +109,15 @@ def _tree(result: PlanResult) -> tuple[_Node, int]:
 
 
 def _reach(root: _Node, actions: Sequence[str]) -> list[_Node]:
-    """All nodes on the way, which are made where they are missing."""
-    way = [root]
+    """All nodes that these actions pass through, which are made where they are missing."""
+    passed = [root]
     for action in actions:
-        way.append(way[-1].next.setdefault(action, _Node(way[-1].step + 1)))
-    return way
+        passed.append(passed[-1].next.setdefault(action, _Node(passed[-1].step + 1)))
+    return passed
 
 
-def _all(node: _Node) -> Iterator[_Node]:
-    waiting = [node]
+def _all(root: _Node) -> Iterator[_Node]:
+    waiting = [root]
     while waiting:
         node = waiting.pop()
         yield node
@@ -159,20 +161,20 @@ def _draw(axis: Axes, root: _Node, step: float) -> int:
             look = {"color": ON_PLAN if kept else LEFT, "lw": 1.6 if kept else 0.7, "zorder": 3 if kept else 2}
             _branch(axis, node, child.step, child.row, look)
             room = (1 - _TRUNK) * step - 0.02
-            said = _fitting(name, room) if step else ""
-            left_out += bool(step and not said)
-            if said:
+            text = _fitting(name, room) if step else ""
+            left_out += bool(step and not text)
+            if text:
                 # Clear of what is refused in the row above, if there is room.
-                at = child.step - min(0.06, room - width_of(said, _LETTERS)) / step
+                at = child.step - min(0.06, room - width_of(text, _LETTERS)) / step
                 colour = ON_PLAN if kept else "0.35"
-                axis.text(at, child.row - 0.12, said, fontsize=_LETTERS, color=colour, ha="right", va="bottom")
+                axis.text(at, child.row - 0.12, text, fontsize=_LETTERS, color=colour, ha="right", va="bottom")
         for name, row in zip(node.refused, node.refused_rows):
             _branch(axis, node, node.step + 1, row, {"color": REFUSED, "lw": 0.6, "zorder": 1, "ls": ":"})
             axis.plot(node.step + 1, row, "x", color=REFUSED, ms=size, mew=1.0, zorder=4)
             if step:
                 at = node.step + 1 + 0.05 / step
-                said = shortened(name)
-                axis.text(at, row, said, fontsize=_LETTERS, color=REFUSED, ha="left", va="center_baseline", zorder=6)
+                place: dict[str, Any] = {"ha": "left", "va": "center_baseline", "zorder": 6}
+                axis.text(at, row, shortened(name), fontsize=_LETTERS, color=REFUSED, **place)
         colour = ON_PLAN if node.on_plan else LEFT
         axis.plot(node.step, node.row, "o", color=colour, ms=size + (0.8 if node.on_plan else 0), zorder=5)
     return left_out
@@ -189,16 +191,3 @@ def _fitting(name: str, width: float) -> str:
     while letters and width_of(shortened(name, letters), _LETTERS) > width:
         letters -= 1
     return shortened(name, letters) if letters >= min(len(name), _LEAST) else ""
-
-
-def _legend(figure: Figure, root: _Node, *, solved: bool) -> None:
-    from matplotlib.lines import Line2D
-
-    said = "accepted, left" if solved else "accepted"
-    left = Line2D([], [], color=LEFT, marker="o", ms=3.2, lw=0.7, label=said)
-    refused = Line2D([], [], color=REFUSED, marker="x", ms=3.2, lw=0.6, ls=":", label="refused")
-    plan = Line2D([], [], color=ON_PLAN, marker="o", ms=4, lw=1.6, label="the plan")
-    nodes = list(_all(root))
-    kinds = [(plan, solved), (left, any(not n.on_plan for n in nodes)), (refused, any(n.refused for n in nodes))]
-    handles = [handle for handle, there in kinds if there]
-    figure.legend(handles=handles, loc="outside lower center", ncols=3, fontsize=SMALL, frameon=False)

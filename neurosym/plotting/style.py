@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from neurosym.support.files import replacing
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure as Figure
+    from matplotlib.lines import Line2D
 
 #: Okabe and Ito's colours, told apart by people with any of the common colour deficiencies. One a prior, in order.
 COLOURS = ("#7f7f7f", "#E69F00", "#56B4E9", "#D55E00", "#0072B2", "#009E73", "#CC79A7", "#000000")
@@ -58,6 +61,23 @@ def tidy(axis: Axes, *, sides: tuple[str, ...] = ("top", "right")) -> None:
     axis.tick_params(labelsize=SMALL)
     for side in sides:
         axis.spines[side].set_visible(False)
+
+
+def mark(marker: str, label: str, **look: Any) -> Line2D:
+    """An entry of a legend for points."""
+    from matplotlib.lines import Line2D
+
+    return Line2D([], [], **{"ls": "", "marker": marker, "label": label, **look})
+
+
+def papers_mark(label: str = "mean in the paper", *, ms: float = 4) -> Line2D:
+    return mark("D", label, ms=ms, mfc="white", mec="black")
+
+
+def add_legend(figure: Figure, handles: Sequence[Artist], *, columns: int = 2, **more: Any) -> None:
+    """Below all panels, where it lies on no curve."""
+    place = {"loc": "outside lower center", "ncols": columns, "fontsize": SMALL, "frameon": False, **more}
+    figure.legend(handles=handles, **place)
 
 
 def save(figure: Figure, path: str | Path, *, dpi: int = 200) -> Path:

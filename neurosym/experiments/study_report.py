@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-import numpy as np
-
 from neurosym import __version__
-from neurosym.experiments.conclusions import findings
-from neurosym.experiments.csv_lines import write_records
-from neurosym.experiments.reporting import provenance
-from neurosym.experiments.study_figures import Drawn, write_figures
+from neurosym.experiments.conclusions import conclusions
+from neurosym.experiments.reporting import markdown_table, provenance, spread, write_records
+from neurosym.experiments.study_figures import Drawn, figures
 from neurosym.experiments.study_results import Results
+from neurosym.plotting import save_both
 from neurosym.support.files import write_text
 
 _METRICS = {
@@ -36,7 +34,11 @@ _BASELINES = {
 def write_results(results: Results, out: Path) -> None:
     """Write results.csv, report.md, and the figures, each as PNG and SVG, into `out`."""
     write_records(results.records, out / "results.csv")
-    write_text(out / "report.md", report(results, write_figures(results, out)))
+    drawn = []
+    for each in figures(results):
+        save_both(each.figure, out / each.name)
+        drawn.append(each)
+    write_text(out / "report.md", report(results, drawn))
 
 
 def report(results: Results, drawn: Sequence[Drawn] = ()) -> str:
@@ -44,18 +46,18 @@ def report(results: Results, drawn: Sequence[Drawn] = ()) -> str:
 
     Args:
         results: of all trials.
-        drawn: figures that lie beside the page; what is said of them.
+        drawn: figures that lie beside the page.
     """
     study = results.study
     seeds = f"Mean over {study.seeds} seeds ± deviation" if study.seeds > 1 else "One seed"
-    said = [
+    introduction = [
         study.about,
         f"{seeds}. A sequence of colours or letters is seen when it was trained on.",
-        *(_BASELINES[b] for b in study.baselines if b in _BASELINES),
+        *(_BASELINES[name] for name in study.baselines if name in _BASELINES),
     ]
-    lines = [f"# {study.name}", "", " ".join(filter(None, said))]
+    lines = [f"# {study.name}", "", " ".join(filter(None, introduction))]
     for style in study.pictures:
-        lines += ["", f"## {study.name}: {style} pictures", "", *(f"* {s}" for s in findings(results, style)), ""]
+        lines += ["", f"## {study.name}: {style} pictures", "", *(f"* {s}" for s in conclusions(results, style)), ""]
         lines += _table(results, style)
     for figure in drawn:
         if figure.shown:
@@ -69,30 +71,18 @@ def report(results: Results, drawn: Sequence[Drawn] = ()) -> str:
 
 def _table(results: Results, style: str) -> list[str]:
     study = results.study
-    rows = [*study.methods, *study.baselines]
-    asked = [m for m in _METRICS if m != "stop_accuracy" or results.lengths_vary]
-    metrics = [m for m in asked if any(results.values(style, r, n, m) for r in rows for n in study.sizes)]
-    head = [study.what, "method", *(_METRICS[m] for m in metrics)]
-    published = study.published or {}
-    head += ["paper: whole sequence", "paper: re-use"] if published else []
-    lines = [f"| {' | '.join(head)} |", "|" + "---|" * len(head)]
+    metrics = [m for m in _METRICS if m != "stop_accuracy" or results.lengths_vary]
+    metrics = [m for m in metrics if any(results.means(style, row, m) for row in study.rows)]
+    papers = ["paper: whole sequence", "paper: re-use"] if study.published else []
+    lines = [[study.what, "method", *(_METRICS[m] for m in metrics), *papers]]
     for n in study.sizes:
-        for method in rows:
-            row = [str(n), method]
-            row += [_spread(results.values(style, method, n, m), 1 if "seconds" in m else 3) for m in metrics]
-            if published:
-                row += _published(published.get(method, {}))
-            lines.append(f"| {' | '.join(row)} |")
-    return lines
+        for method in study.rows:
+            means = [spread(results.values(style, method, n, m), 1 if "seconds" in m else 3) for m in metrics]
+            lines.append([str(n), method, *means, *(_published(study.published.get(method)) if papers else ())])
+    return markdown_table(lines)
 
 
-def _published(own: Mapping[str, float]) -> list[str]:
+def _published(own: Mapping[str, float] | None) -> tuple[str, str]:
     if not own:
-        return ["", ""]
-    return [f"{own['whole_sequence']:.2f} ± {own['whole_sequence_std']:.2f}", f"{own['re_use']:.2f}"]
-
-
-def _spread(values: Sequence[float], digits: int) -> str:
-    if not values:
-        return ""
-    return f"{np.mean(values):.{digits}f}" + (f" ± {np.std(values):.{digits}f}" if len(values) > 1 else "")
+        return "", ""
+    return f"{own['whole_sequence']:.2f} ± {own['whole_sequence_std']:.2f}", f"{own['re_use']:.2f}"
