@@ -75,6 +75,25 @@ def test_a_prior_that_knows_a_plan_never_fails_first():
     assert all(r.iterations == 0 and not r.first_order_failed and r.solved for r in found)
 
 
+def test_a_plan_with_false_motions_is_refused_as_by_solve(monkeypatch):
+    class Liar(ns.Planner):
+        """The right order; but the bolt, which leaves along +x, is pushed into its case."""
+
+        traits = ns.load_planner("backtracking").traits
+
+        def plan(self, problem, scores, *, budget, rng):
+            result = ns.load_planner("backtracking").plan(problem, scores, budget=budget, rng=rng)
+            return replace(result, how=(replace(result.how[0], direction=(-1.0, 0.0, 0.0)), *result.how[1:]))
+
+    drawer = ns.load_domain("assembly").problem(5)
+    assert ns.validate(drawer, ns.solve(drawer).plan), "the order alone is right"
+    with pytest.raises(ns.ContractError, match="bolt cannot go along -x"):
+        ns.solve(drawer, planner=Liar())
+    monkeypatch.setattr(benchmark, "load_planner", lambda name: Liar())
+    with pytest.raises(ns.ContractError, match="bolt cannot go along -x"):
+        run(Comparison("assembly", (5,), ("liar",), ("none",)))
+
+
 class TestResuming:
     def test_what_is_done_is_not_done_again(self, runs, tmp_path, monkeypatch):
         journal = tmp_path / "deep" / "runs.jsonl"
