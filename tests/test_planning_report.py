@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 import pytest
+from matplotlib.figure import Figure
 
 from neurosym.experiments.planning_report import conclusions, methods_figure, report
-from neurosym.experiments.reporting import RECORD
+from neurosym.experiments.reporting import RECORD, Drawn
 from neurosym.experiments.reproduce import Experiment
 
 SOMA = Experiment("soma", splits=2, styles=("clean",), methods=("sinkhorn", "sinkhorn-paper", "tcn-paper"))
@@ -65,7 +66,7 @@ def test_the_figure_has_every_planner_and_the_papers_means():
 
 
 def test_the_page_names_what_to_know():
-    page = report(SOMA, records(), {"clean": [("methods-clean", "Each split")]})
+    page = report(SOMA, records(), [Drawn("methods-clean", "Each split, clean pictures", Figure())])
     for piece in ("51.55 ± 6.19", "counts of 120", "2 splits", "![Each split, clean pictures](methods-clean.png)"):
         assert piece in page
     assert "| blind | 70.0 ± 1.0 |" in page

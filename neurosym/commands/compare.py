@@ -96,8 +96,7 @@ def compare(
     with progress_bar("planning") as progress:
         journal = folder / "runs.jsonl" if folder else None
         runs = run(comparison, scores, workers=processes, journal=journal, progress=progress)
-    blind = image_blind(comparison, split=split)
-    outcome = Outcome(comparison, runs, *(blind or (None, ())))
+    outcome = Outcome(comparison, runs, *image_blind(comparison, split=split))
     table = rows(outcome)
     if folder:
         _write(outcome, table, folder)

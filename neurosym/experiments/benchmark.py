@@ -193,22 +193,22 @@ def run(
     return tuple(done[cell, number] for cell in comparison.cells for number in comparison.numbers)
 
 
-def image_blind(comparison: Comparison, *, split: int = 0) -> tuple[float, tuple[str, ...]] | None:
+def image_blind(comparison: Comparison, *, split: int = 0) -> tuple[float | None, tuple[str, ...]]:
     """The share of the compared problems that the best fixed order fails on, and that order.
 
-    The order is the one that fails least on the training problems (by geometry); nothing is looked at. None where
-    the family's problems do not share their actions.
+    The order is the one that fails least on the training problems (by geometry); nothing is looked at. None, and no
+    order, where the family's problems do not share their actions.
     """
     family = load_domain(comparison.domain)
     training = [p.ground() for p in family.problems("train", split=split, **comparison.options)]
     order = best_fixed_order(training)
     if order is None:
-        return None
+        return None, ()
     failures = 0
     for number in comparison.numbers:
         problem = family.problem(number, **comparison.options)
         if set(order) - set(problem.actions):
-            return None
+            return None, ()
         with pipeline.open_oracle(problem, comparison.oracle) as search:
             failures += order_fails(search, [problem.actions.index(a) for a in order])
     return failures / len(comparison.numbers), order

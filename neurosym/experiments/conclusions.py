@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from itertools import combinations
 
-from neurosym.experiments.hypotheses import OF_OURS, OF_THE_PAPER, Hypothesis
-from neurosym.experiments.study_results import Results
+from neurosym.experiments.hypotheses import OF_OURS, OF_THE_PAPER
+from neurosym.experiments.studies import Results
 
 #: Metrics in which our recipe is set against the paper's, as sentences name them.
 COMPARED = {
@@ -26,8 +26,10 @@ def conclusions(results: Results, style: str) -> list[str]:
         for metric in ("whole_sequence", "per_step"):
             sentences += _above(results, style, baseline, metric)
     for who, hypotheses in (("The paper: ", OF_THE_PAPER), (f"Asked of `{study.ours}`: ", OF_OURS)):
-        for hypothesis in hypotheses.get(study.name, ()):
-            sentences += _tested(results, style, hypothesis, who)
+        for statement, test in hypotheses.get(study.name, ()):
+            if (answer := test(results, style)) is not None:
+                verdict = "holds" if answer[0] else "does not hold"
+                sentences.append(f"{who}{statement} Here it **{verdict}**: {answer[1]}.")
     return sentences
 
 
@@ -99,14 +101,6 @@ def _above(results: Results, style: str, baseline: str, metric: str) -> list[str
     methods = "; ".join(f"{where}: {', '.join(names)}" for where, names in places.items())
     heights = ", ".join(f"{_at(results, n)}{v:.3f}" for n, v in line.items())
     return [f"Above the {_BASELINES.get(baseline, baseline)} in {COMPARED[metric]} ({heights}): {methods}."]
-
-
-def _tested(results: Results, style: str, hypothesis: Hypothesis, who: str) -> list[str]:
-    answer = hypothesis.test(results, style)
-    if answer is None:
-        return []
-    holds, numbers = answer
-    return [f"{who}{hypothesis.statement} Here it **{'holds' if holds else 'does not hold'}**: {numbers}."]
 
 
 def _at(results: Results, n: int) -> str:

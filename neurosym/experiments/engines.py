@@ -10,7 +10,7 @@ import os
 import socket
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import Any, NoReturn, TypeVar
 
 from neurosym import __version__
@@ -25,8 +25,7 @@ ENGINES = ("local", "ray")
 #: How often Ray runs a task again whose node or process was lost, or that failed on its machine (no memory, no disk).
 RETRIES = 5
 
-#: A cluster that does not answer within so many seconds is not there. Ray itself would try for two minutes, and then
-#: end the process.
+#: A cluster that does not answer within so many seconds is not there. Ray itself would end the process, in two minutes.
 REACH_SECONDS = 5.0
 
 
@@ -49,10 +48,9 @@ def run_tasks(
     by cloudpickle, so a function may be a closure.
 
     Args:
-        function: gives the same result for the same task, wherever and however often it runs: a Ray cluster that lost
-            a node runs some tasks again.
-        engine: ``"local"``, or ``"ray"``: an existing Ray cluster, whose nodes all have this library; a task takes one
-            of its processors.
+        function: gives the same result for the same task, wherever and however often it runs: Ray runs tasks of a lost
+            node again.
+        engine: ``"local"``, or ``"ray"``: an existing Ray cluster, whose nodes all have this library.
         workers: most tasks at a time. Locally these are processes, None is one a processor, and 1 runs the tasks in
             this process; on Ray, None leaves it to the cluster.
         address: of the cluster, ``"HOST:PORT"``; None takes the environment's ``RAY_ADDRESS``, or the one that runs on
@@ -76,23 +74,19 @@ def run_tasks(
     return _in_processes(function, tasks, workers or cores())
 
 
-@contextmanager
-def connection(engine: str, address: str | None = None) -> Iterator[None]:
+def connection(engine: str, address: str | None = None) -> AbstractContextManager[Any]:
     """Stay connected, for several runs in a row; raises as `run_tasks` does. With the local engine it does nothing."""
-    with _connected(address) if engine == "ray" else nullcontext():
-        yield
+    return _connected(address) if engine == "ray" else nullcontext()
 
 
-def _in_processes(
-    function: Callable[[Task], Result], tasks: Sequence[Task], workers: int
-) -> Iterator[tuple[Task, Result]]:
+def _in_processes(run: Callable[[Task], Result], tasks: Sequence[Task], workers: int) -> Iterator[tuple[Task, Result]]:
     from joblib import Parallel, delayed, parallel_config
     from joblib.externals.loky.process_executor import BrokenProcessPool
 
     # Left before the first result: a generator that is suspended inside would configure its caller, too.
     with parallel_config(backend="loky", inner_max_num_threads=1):
         pool = Parallel(n_jobs=workers, return_as="generator_unordered", batch_size=1)
-    finished = pool(delayed(_alone)(function, task, k) for k, task in enumerate(tasks))
+    finished = pool(delayed(_alone)(run, task, k) for k, task in enumerate(tasks))
     try:
         for k, result in finished:
             yield tasks[k], result
@@ -112,19 +106,18 @@ def _alone(function: Callable[[Task], Result], task: Task, number: int) -> tuple
 
 
 def _on_ray(
-    function: Callable[[Task], Result], tasks: Sequence[Task], workers: int | None, address: str | None
+    run: Callable[[Task], Result], tasks: Sequence[Task], workers: int | None, address: str | None
 ) -> Iterator[tuple[Task, Result]]:
     """Ray's own tasks, run again elsewhere when a node is lost: joblib's pool on Ray does not outlive that."""
     with _connected(address) as ray:
-        options = {"num_cpus": 1, "max_retries": RETRIES, "retry_exceptions": [OSError, MemoryError]}
-        remote = ray.remote(**options)(_on_node)
+        remote = ray.remote(num_cpus=1, max_retries=RETRIES, retry_exceptions=[OSError, MemoryError])(_on_node)
         waiting = deque(enumerate(tasks))
         flying: dict[Any, int] = {}
         try:
             while waiting or flying:
                 while waiting and (workers is None or len(flying) < workers):
                     k, task = waiting.popleft()
-                    flying[remote.remote(__version__, function, task, k)] = k
+                    flying[remote.remote(__version__, run, task, k)] = k
                 for finished in ray.wait(list(flying), num_returns=1)[0]:
                     k = flying.pop(finished)
                     yield tasks[k], _fetched(ray, finished)
@@ -162,12 +155,12 @@ def _connected(address: str | None) -> Iterator[Any]:
     if ray.is_initialized():
         yield ray
         return
-    found = address or os.environ.get("RAY_ADDRESS") or "auto"
-    _reach(found)
+    address = address or os.environ.get("RAY_ADDRESS") or "auto"
+    _reach(address)
     try:
-        ray.init(address=found, log_to_driver=False, logging_level="ERROR")
+        ray.init(address=address, log_to_driver=False, logging_level="ERROR")
     except (Exception, SystemExit) as error:  # what is no Ray cluster makes it leave the process
-        _refuse(found, error)
+        _refuse(address, error)
     try:
         yield ray
     finally:

@@ -2,27 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Any
 
-from neurosym.experiments.study_results import Results
+from neurosym.experiments.studies import Results
 
 #: Shares that differ by less are called alike.
 ALIKE = 0.05
 
 #: Whether it holds, and the numbers that decide; None where the results do not bear on it.
 Answer = tuple[bool, str] | None
+#: Called with the results and a style of pictures.
 Test = Callable[[Results, str], Answer]
-
-
-@dataclass(frozen=True)
-class Hypothesis:
-    """A statement, and its test, which is called with the results and a style of pictures."""
-
-    statement: str
-    test: Test
+#: A statement, and its test.
+Hypothesis = tuple[str, Test]
 
 
 def ahead(first: str, second: str, metric: str) -> Test:
@@ -60,86 +54,69 @@ def reaches(
     return test
 
 
-def drops_less(first: str, second: str, metric: str) -> Test:
-    """From the least n to the greatest, `first` loses less than `second`."""
-
-    def test(results: Results, style: str) -> Answer:
-        least, most = min(results.study.sizes), max(results.study.sizes)
-        means = {method: results.means(style, method, metric) for method in (first, second)}
-        if least == most or not all({least, most} <= set(own) for own in means.values()):
-            return None
-        lost = {method: own[least] - own[most] for method, own in means.items()}
-        numbers = ", ".join(f"{method} loses {value:.3f}" for method, value in lost.items())
-        return lost[first] < lost[second], f"from n = {least} to {most} {numbers}"
-
-    return test
+def _loses_less(results: Results, style: str) -> Answer:
+    """From the least n to the greatest, fewer of the steps than the TCN."""
+    least, most = min(results.study.sizes), max(results.study.sizes)
+    means = {m: results.means(style, m, "per_step") for m in ("sinkhorn-paper", "tcn-paper+hungarian")}
+    if least == most or not all({least, most} <= set(own) for own in means.values()):
+        return None
+    lost = {method: own[least] - own[most] for method, own in means.items()}
+    numbers = ", ".join(f"{method} loses {value:.3f}" for method, value in lost.items())
+    return lost["sinkhorn-paper"] < lost["tcn-paper+hungarian"], f"from n = {least} to {most} {numbers}"
 
 
-def errs_more_with_repeats(method: str) -> Test:
+def _tcn_errs_more_with_repeats(results: Results, style: str) -> Answer:
     """At the greatest n, a larger share of steps is wrong in sequences with two repetitions or more than with none."""
-
-    def test(results: Results, style: str) -> Answer:
-        counts = results.counts.get((style, method, max(results.study.sizes)))
-        if counts is None or not counts.repeats[0, 0] or not counts.repeats[2:, 0].sum():
-            return None
-        none = counts.repeats[0, 1] / counts.repeats[0, 0]
-        some = counts.repeats[2:, 1].sum() / counts.repeats[2:, 0].sum()
-        return bool(some > none), f"{none:.3f} of the steps are wrong without repetitions, {some:.3f} with two or more"
-
-    return test
+    counts = results.counts.get((style, "tcn-paper+hungarian", max(results.study.sizes)))
+    if counts is None or not counts.repeats[0, 0] or not counts.repeats[2:, 0].sum():
+        return None
+    none = counts.repeats[0, 1] / counts.repeats[0, 0]
+    some = counts.repeats[2:, 1].sum() / counts.repeats[2:, 0].sum()
+    return bool(some > none), f"{none:.3f} of the steps are wrong without repetitions, {some:.3f} with two or more"
 
 
-def re_uses(those: Sequence[str], others: Sequence[str]) -> Test:
-    """Some methods use an action twice, others never do."""
+def _unassigned_re_use(results: Results, style: str) -> Answer:
+    """Methods without an assignment use an action twice, the others never do."""
+    unassigned = ("bc", "tcn-paper")
+    methods = (*unassigned, "bc+hungarian", "tcn-paper+hungarian", "sinkhorn-paper")
+    n = max(results.study.sizes)
+    means = {m: mean for m in methods if (mean := results.mean(style, m, n, "re_use")) is not None}
+    numbers = ", ".join(f"{m} in {mean:.2f}" for m, mean in means.items()) + " of the sequences"
+    return (all((mean > 0) == (m in unassigned) for m, mean in means.items()), numbers) if means else None
 
-    def test(results: Results, style: str) -> Answer:
-        n = max(results.study.sizes)
-        means = {m: mean for m in (*those, *others) if (mean := results.mean(style, m, n, "re_use")) is not None}
-        numbers = ", ".join(f"{m} in {mean:.2f}" for m, mean in means.items()) + " of the sequences"
-        return (all((mean > 0) == (m in those) for m, mean in means.items()), numbers) if means else None
-
-    return test
-
-
-_ASSIGNED = ("bc+hungarian", "tcn-paper+hungarian", "sinkhorn-paper")
 
 #: By study: what the paper says. Its order of the five methods is checked by `neurosym.experiments.conclusions`.
 OF_THE_PAPER: Mapping[str, tuple[Hypothesis, ...]] = MappingProxyType(
     {
-        "tower": (
-            Hypothesis("BC and BC+TCN use blocks twice, the others never do.", re_uses(("bc", "tcn-paper"), _ASSIGNED)),
-        ),
+        "tower": (("BC and BC+TCN use blocks twice, the others never do.", _unassigned_re_use),),
         "unseen": (
-            Hypothesis(
+            (
                 "With unique actions BC+Sinkhorn and BC+TCN perform similarly (steps right).",
                 alike("sinkhorn-paper", "tcn-paper", "per_step"),
             ),
-            Hypothesis("BC+Sinkhorn is above the memoriser's line.", ahead("sinkhorn-paper", "memoriser", "per_step")),
-            Hypothesis("BC+TCN is above the memoriser's line.", ahead("tcn-paper", "memoriser", "per_step")),
+            ("BC+Sinkhorn is above the memoriser's line.", ahead("sinkhorn-paper", "memoriser", "per_step")),
+            ("BC+TCN is above the memoriser's line.", ahead("tcn-paper", "memoriser", "per_step")),
         ),
         "variable": (
-            Hypothesis(
+            (
                 "BC+Sinkhorn is ahead of BC+TCN+Hungarian (steps right).",
                 ahead("sinkhorn-paper", "tcn-paper+hungarian", "per_step"),
             ),
-            Hypothesis(
+            (
                 "The stopping network knows the length from about 200 demonstrations on (at least .99).",
                 reaches("sinkhorn-paper", "stop_accuracy", 0.99, from_n=200),
             ),
         ),
         "scrabble": (
-            Hypothesis(
-                "With more actions BC+Sinkhorn loses little, BC+TCN+Hungarian much (letters right).",
-                drops_less("sinkhorn-paper", "tcn-paper+hungarian", "per_step"),
-            ),
-            Hypothesis("The TCN errs more where letters repeat.", errs_more_with_repeats("tcn-paper+hungarian")),
+            ("With more actions BC+Sinkhorn loses little, BC+TCN+Hungarian much (letters right).", _loses_less),
+            ("The TCN errs more where letters repeat.", _tcn_errs_more_with_repeats),
         ),
     }
 )
 
 
 def _ours(statement: str, metric: str, bound: float, **more: Any) -> Hypothesis:
-    return Hypothesis(statement, reaches("sinkhorn", metric, bound, **more))
+    return statement, reaches("sinkhorn", metric, bound, **more)
 
 
 #: By study: what is asked of `sinkhorn`.
@@ -151,7 +128,7 @@ OF_OURS: Mapping[str, tuple[Hypothesis, ...]] = MappingProxyType(
             _ours("Trained in at most 30 s.", "training_seconds", 30, above=False),
         ),
         "unseen": (
-            Hypothesis("Above the memoriser's line (steps right).", ahead("sinkhorn", "memoriser", "per_step")),
+            ("Above the memoriser's line (steps right).", ahead("sinkhorn", "memoriser", "per_step")),
             _ours("At least .9 of the steps from 200 towers on.", "per_step", 0.9, from_n=200),
         ),
         "variable": (

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,10 +14,17 @@ import pandas as pd
 
 from neurosym import __version__
 from neurosym.experiments.benchmark import Outcome
-from neurosym.experiments.reporting import figure_of, markdown_table, provenance, spread, values_by, write_records
-from neurosym.plotting import Panel, points_figure, save_both
+from neurosym.experiments.reporting import (
+    Drawn,
+    figure_of,
+    markdown_table,
+    provenance,
+    spread,
+    values_by,
+    write_experiment,
+)
+from neurosym.plotting import Panel, points_figure
 from neurosym.registry import load_domain
-from neurosym.support.files import write_text
 
 if TYPE_CHECKING:
     from neurosym.experiments.reproduce import Experiment
@@ -41,19 +49,20 @@ def write_results(
     Args:
         outcomes: (style, split) -> its comparison.
     """
-    write_records(records, out / "results.csv")
-    figures: dict[str, list[tuple[str, str]]] = {}
+    write_experiment(records, _figures(experiment, records, outcomes), partial(report, experiment, records), out)
+
+
+def _figures(
+    experiment: Experiment, records: pd.DataFrame, outcomes: Mapping[tuple[str, int], Outcome]
+) -> Iterator[Drawn]:
     for style in experiment.styles:
         own = [outcomes[style, split] for split in range(experiment.splits)]
         numbers = tuple(n for each in own for n in each.comparison.numbers)
         pooled = Outcome(replace(own[0].comparison, numbers=numbers), tuple(run for each in own for run in each.runs))
-        save_both(methods_figure(experiment, records, style), out / f"methods-{style}")
-        save_both(figure_of(pooled), out / f"iterations-{style}")
-        figures[style] = [
-            (f"methods-{style}", "Each split, their means, and the paper's"),
-            (f"iterations-{style}", "Distribution of iterations, all splits"),
-        ]
-    write_text(out / "report.md", report(experiment, records, figures))
+        of = f"{style} pictures"
+        figure = methods_figure(experiment, records, style)
+        yield Drawn(f"methods-{style}", f"Each split, their means, and the paper's, {of}", figure)
+        yield Drawn(f"iterations-{style}", f"Distribution of iterations, all splits, {of}", figure_of(pooled))
 
 
 def methods_figure(experiment: Experiment, records: pd.DataFrame, style: str) -> Figure:
@@ -75,13 +84,11 @@ def methods_figure(experiment: Experiment, records: pd.DataFrame, style: str) ->
     return points_figure(title, rows, panels, each="one split")
 
 
-def report(
-    experiment: Experiment, records: pd.DataFrame, figures: Mapping[str, Sequence[tuple[str, str]]] | None = None
-) -> str:
+def report(experiment: Experiment, records: pd.DataFrame, drawn: Sequence[Drawn] = ()) -> str:
     """A page of Markdown: ours beside the paper's, means over splits with the deviation between splits.
 
     Args:
-        figures: style -> (name of a figure beside the page, without ending, caption).
+        drawn: figures that lie beside the page, named after their style of pictures.
     """
     lines = [
         f"# {experiment.domain}",
@@ -95,8 +102,8 @@ def report(
         lines += ["", f"## {experiment.domain}: {style} pictures", ""]
         lines += [*(f"* {sentence}" for sentence in conclusions(experiment, records, style)), ""]
         lines += _table(experiment, records, style)
-        for name, caption in (figures or {}).get(style, ()):
-            lines += ["", f"![{caption}, {style} pictures]({name}.png)"]
+        for figure in drawn:
+            lines += ["", f"![{figure.caption}]({figure.name}.png)"] if figure.name.endswith(f"-{style}") else []
     splits = f"splits 0 to {experiment.splits - 1}" if experiment.splits > 1 else "split 0"
     runs = f"{splits}, seed {experiment.seed}, each test problem planned {experiment.repeats} times"
     return "\n".join([*lines, "", f"neurosym {__version__}, {runs}; {provenance()}", ""])

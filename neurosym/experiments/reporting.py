@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 import platform
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,7 +14,7 @@ import numpy as np
 import pandas as pd
 
 from neurosym.experiments.benchmark import NO_PRIOR, Outcome
-from neurosym.plotting import iterations_figure
+from neurosym.plotting import iterations_figure, save_both
 from neurosym.registry import load_domain
 from neurosym.support.files import write_text
 
@@ -157,6 +158,16 @@ def write_csv(given: Sequence[Row], path: str | Path) -> Path:
 # -- what all reports share -----------------------------------------------------------------------------------
 
 
+@dataclass(frozen=True)
+class Drawn:
+    """A figure: the name of its files without ending, what it shows, and whether the report shows it or only links."""
+
+    name: str
+    caption: str
+    figure: Figure
+    shown: bool = True
+
+
 def markdown_table(lines: Sequence[Sequence[str]], rule: str = "---") -> list[str]:
     """The lines of a Markdown table; the first is its head."""
     head, *body = (f"| {' | '.join(line)} |" for line in lines)
@@ -168,9 +179,16 @@ def values_by(records: pd.DataFrame, *columns: str) -> dict[tuple[Any, ...], lis
     return dict(records.groupby(list(columns))["value"].agg(list))
 
 
-def write_records(records: pd.DataFrame, path: Path) -> None:
-    """Write results.csv, whole or not at all."""
-    write_text(path, records.to_csv(index=False, lineterminator="\n"))
+def write_experiment(
+    records: pd.DataFrame, drawn: Iterable[Drawn], page: Callable[[Sequence[Drawn]], str], out: Path
+) -> None:
+    """Write results.csv, the figures, each as PNG and SVG, and the page that shows them, report.md, into `out`."""
+    write_text(out / "results.csv", records.to_csv(index=False, lineterminator="\n"))
+    figures = []
+    for each in drawn:
+        save_both(each.figure, out / each.name)
+        figures.append(each)
+    write_text(out / "report.md", page(figures))
 
 
 def spread(values: Sequence[float], digits: int = 3, *, scale: float = 1) -> str:

@@ -208,13 +208,10 @@ def _compare(
     scores = benchmark.ask_priors(comparison, workers=min(workers or cores(), cores()), loaded=trained)
     journal = out / f"runs-{style}-{split}.jsonl"
     runs = benchmark.run(comparison, scores, workers=workers, journal=journal, **where)
-    blind = benchmark.image_blind(comparison, split=split)
-    return Outcome(comparison, runs, *(blind or (None, ())))
+    return Outcome(comparison, runs, *benchmark.image_blind(comparison, split=split))
 
 
-def _lines(
-    experiment: Experiment, outcome: Outcome, style: str, split: int, out: Path
-) -> Iterator[tuple[Any, ...]]:
+def _lines(experiment: Experiment, outcome: Outcome, style: str, split: int, out: Path) -> Iterator[tuple[Any, ...]]:
     """The lines of results.csv of one comparison."""
     figures: dict[tuple[str, str], float] = {}
     for method, runs in pd.DataFrame(list(outcome.runs)).groupby("prior", sort=False):
@@ -234,14 +231,8 @@ def _lines(
 def _same_experiment(experiment: Experiment, out: Path) -> None:
     """A folder belongs to one experiment: what another left there would be taken for finished."""
     fixed = {"domain": experiment.domain, "seed": experiment.seed, "epochs": experiment.epochs, "version": __version__}
-    path = out / "experiment.json"
-    if path.exists():
-        try:
-            known = json.loads(path.read_text())
-        except ValueError:
-            known = None
-        if known != fixed:
-            raise InputError(
-                f"Expected {out} to be empty or to hold this experiment, {fixed}; it holds {known}. Name another."
-            )
-    write_text(path, json.dumps(fixed) + "\n")
+    path, own = out / "experiment.json", json.dumps(fixed)
+    known = path.read_text().strip() if path.exists() else own
+    if known != own:
+        raise InputError(f"Expected {out} to be empty or of this experiment, {own}; it holds {known}. Name another.")
+    write_text(path, f"{own}\n")

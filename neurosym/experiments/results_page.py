@@ -41,16 +41,17 @@ def write_results_page(folders: Sequence[Path], to: Path) -> Path:
     if len(set(names)) < len(names):
         raise InputError(f"Expected folders of different names, as figures are named after them; got {names}.")
     sections = [_section(folder, name, to.parent / "figures") for folder, name in zip(folders, names)]
-    titles = [re.search(r"^## (.*)$", section, re.MULTILINE) for section in sections]
-    contents = [f"* [{t.group(1)}](#{_anchor(t.group(1))})" for t in titles if t]
+    titles = [title[1] for section in sections if (title := re.search(r"^## (.*)$", section, re.MULTILINE))]
+    contents = [f"* [{title}](#{_anchor(title)})" for title in titles]
     write_text(to, "\n\n".join(["# Results", _INTRODUCTION, "\n".join(contents), *sections]) + "\n")
     return to
 
 
 def finished_runs(parent: Path) -> list[Path]:
     """The folders ``reproduce-*`` in `parent` that have a report, in the paper's order."""
-    found = sorted(page.parent for page in parent.glob("reproduce-*/report.md"))
-    return sorted(found, key=lambda folder: ORDER.index(n) if (n := _name(folder)) in ORDER else len(ORDER))
+    ranks = {name: rank for rank, name in enumerate(ORDER)}
+    folders = sorted(page.parent for page in parent.glob("reproduce-*/report.md"))
+    return sorted(folders, key=lambda folder: ranks.get(_name(folder), len(ORDER)))
 
 
 def _name(folder: Path) -> str:

@@ -1,13 +1,18 @@
-"""What is measured without a planner: the paper's tower and Scrabble experiments, each a grid of trials."""
+"""What is measured without a planner: the paper's tower and Scrabble experiments, grids of trials with results."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import astuple, dataclass, field, replace
+from functools import cached_property
 from types import MappingProxyType
 from typing import Any
 
+import pandas as pd
+
 from neurosym.errors import UnknownNameError
+from neurosym.experiments.order_accuracy import Counts
+from neurosym.experiments.reporting import RECORD, values_by
 
 Options = Callable[[int], dict[str, Any]]
 
@@ -46,7 +51,7 @@ class Study:
         baselines: names in `neurosym.experiments.baselines.BASELINES`; calculated for each style, n and seed.
         ours: which of the methods is not the paper's.
         about: what is asked, in a sentence.
-        figures: kinds of figures, see `neurosym.experiments.study_figures`.
+        figures: kinds of figures, see `neurosym.experiments.study_report`.
     """
 
     name: str
@@ -81,6 +86,56 @@ class Study:
         ]
 
 
+@dataclass(frozen=True, eq=False)
+class Results:
+    """All trials of a study.
+
+    Attributes:
+        records: the lines of results.csv, with the columns `RECORD`.
+        counts: (pictures, method, n) -> those of all seeds, added up; baselines have none.
+    """
+
+    study: Study
+    records: pd.DataFrame
+    counts: Mapping[tuple[str, str, int], Counts]
+
+    @classmethod
+    def of(cls, study: Study, trials: Mapping[Trial, Mapping[str, Any]]) -> Results:
+        """From what `run_trial` gave for each trial of the study."""
+        rows: list[tuple[Any, ...]] = []
+        counts: dict[tuple[str, str, int], list[Counts]] = {}
+        for trial in study.trials():
+            rows += [(*astuple(trial), *figure) for figure in sorted(trials[trial]["figures"].items())]
+            if trials[trial]["counts"] is not None:
+                cell = (trial.pictures, trial.method, trial.n)
+                counts.setdefault(cell, []).append(Counts.from_json(trials[trial]["counts"]))
+        records = pd.DataFrame(rows, columns=RECORD)
+        return cls(study, records, {cell: Counts.pooled(own) for cell, own in counts.items()})
+
+    def values(self, pictures: str, method: str, n: int, metric: str) -> list[float]:
+        """A value a seed; empty where there is none (no test sequence was seen, say)."""
+        return self._values.get((pictures, method, n, metric), [])
+
+    def mean(self, pictures: str, method: str, n: int, metric: str) -> float | None:
+        """Over the seeds; None where there is no value."""
+        own = self.values(pictures, method, n, metric)
+        return sum(own) / len(own) if own else None
+
+    def means(self, pictures: str, method: str, metric: str) -> dict[int, float]:
+        """n -> mean over the seeds, where there is one."""
+        means = {n: self.mean(pictures, method, n, metric) for n in self.study.sizes}
+        return {n: mean for n, mean in means.items() if mean is not None}
+
+    @property
+    def lengths_vary(self) -> bool:
+        """Whether the test sequences differ in length, so that where to stop is a question."""
+        return any(int((own.right.sum(axis=1) > 0).sum()) > 1 for own in self.counts.values())
+
+    @cached_property
+    def _values(self) -> dict[tuple[Any, ...], list[float]]:
+        return values_by(self.records, "pictures", "method", "n", "metric")
+
+
 def study_names() -> list[str]:
     """Names that `study` takes."""
     return sorted(_QUICK)
@@ -99,13 +154,9 @@ def study(name: str, scale: str = "quick") -> Study:
     return replace(_QUICK[name], **(_PAPER[name] if scale == "paper" else {}))
 
 
-def _taken(variant: str, count: int | None = None, **more: Any) -> Options:
-    """Options of demonstrations of towers; without a count as many as n."""
-    return lambda n: {"variant": variant, "count": n if count is None else count, **more}
-
-
-def _tiles(count: int) -> Options:
-    return lambda n: {"tiles": n, "count": count}
+def _options(**options: Any) -> Options:
+    """These options; "n" stands for n."""
+    return lambda n: {name: n if value == "n" else value for name, value in options.items()}
 
 
 def _longer(*methods: str) -> dict[str, dict[str, Any]]:
@@ -126,8 +177,8 @@ _TOWER = Study(
     (*_PAPER_FIVE, "sinkhorn"),
     (200,),
     "demonstrations",
-    _taken("colours"),
-    _taken("colours", 100),
+    _options(variant="colours", count="n"),
+    _options(variant="colours", count=100),
     published={
         "bc": {"whole_sequence": 0.46, "whole_sequence_std": 0.08, "re_use": 0.46},
         "bc+hungarian": {"whole_sequence": 0.53, "whole_sequence_std": 0.07, "re_use": 0.0},
@@ -143,8 +194,8 @@ _TOWER = Study(
 _BY_SEQUENCE = replace(
     _TOWER,
     name="tower-by-sequence",
-    options=_taken("colours", by="sequence"),
-    test=_taken("colours", 100, by="sequence"),
+    options=_options(variant="colours", count="n", by="sequence"),
+    test=_options(variant="colours", count=100, by="sequence"),
     published={},
     pictures=("hard",),
     about="The same towers, split so that no colour sequence of the test was ever demonstrated.",
@@ -155,8 +206,8 @@ _UNSEEN = Study(
     ("tcn-paper", "sinkhorn-paper", "sinkhorn"),
     (50, 100, 200, 400),
     "demonstrations",
-    _taken("unique"),
-    lambda _: {"variant": "unique"},
+    _options(variant="unique", count="n"),
+    _options(variant="unique"),
     part="all",
     train=_longer("tcn-paper", "sinkhorn-paper"),
     about="Six blocks of six colours, tested on all 720 towers, seen ones too (the paper's Sec. IV-B, Fig. 5).",
@@ -168,8 +219,8 @@ _VARIABLE = Study(
     ("tcn-paper+hungarian", "sinkhorn-paper", "sinkhorn"),
     (100, 200, 400, 800),
     "demonstrations",
-    _taken("heights"),
-    _taken("heights", 500),
+    _options(variant="heights", count="n"),
+    _options(variant="heights", count=500),
     train=_longer("tcn-paper+hungarian", "sinkhorn-paper"),
     about="Towers of two to six of the blocks in three colours (the paper's Sec. IV-C, Fig. 6).",
     figures=("curves", "confusion"),
@@ -180,8 +231,8 @@ _SCRABBLE = Study(
     ("tcn-paper+hungarian", "sinkhorn-paper", "sinkhorn"),
     (6, 26, 50, 74, 98),
     "actions",
-    _tiles(10_000),
-    _tiles(2_000),
+    _options(tiles="n", count=10_000),
+    _options(tiles="n", count=2_000),
     pictures=("easy",),
     seeds=1,
     train={
@@ -206,13 +257,13 @@ _PAPER: Mapping[str, Mapping[str, Any]] = MappingProxyType(
         "unseen": {"sizes": (25, 50, 100, 150, 200, 300, 400, 480), "seeds": 20},
         "variable": {
             "sizes": (50, 100, 200, 300, 400, 600, 800, 1000, 1300),
-            "test": lambda _: {"variant": "heights"},
+            "test": _options(variant="heights"),
             "seeds": 20,
         },
         # 10,000 pictures to learn from, 5,000 to test; "an increasingly large subset of the full tile set" (Sec. IV-E)
         "scrabble": {
             "sizes": (*range(6, 97, 5), 98),
-            "test": _tiles(5_000),
+            "test": _options(tiles="n", count=5_000),
             "train": {"tcn-paper+hungarian": _WORDS, "sinkhorn-paper": _WORDS},
         },
     }
