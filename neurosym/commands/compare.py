@@ -83,12 +83,14 @@ def compare(
     of_problems = {k: v for k, v in own.items() if k not in only_numbers}
     folder = out if out is not None or as_json else Path("out") / f"compare-{domain}"
     processes = workers or cores()
+    # A family whose problems have no such option is not told the default.
+    style = None if pictures is Pictures.clean else pictures.value
     comparison = Comparison(
         domain=domain,
         numbers=_numbers(family, problems, split, own),
         planners=_once(planner or PLANNERS),
         priors=_once(prior or PRIORS),
-        options=problem_options(family, collapse=collapse, pictures=_style(family, pictures)) | of_problems,
+        options=problem_options(family, collapse=collapse, pictures=style) | of_problems,
         oracle=oracle.value,
         seeds=seeds,
     )
@@ -119,17 +121,12 @@ def _numbers(family: ProblemFamily, problems: str, split: int, options: Mapping[
     return tuple(family.numbers(problems, split=split, **own))
 
 
-def _style(family: ProblemFamily, pictures: Pictures) -> str | None:
-    """A family whose problems have no such option is not told the default."""
-    return None if pictures is Pictures.clean else pictures.value
-
-
 def _once(names: Sequence[str]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(names))
 
 
 def _scores(comparison: Comparison, *, asked: bool, workers: int) -> tuple[Comparison, dict[str, Any]]:
-    """What the priors say; of the default ones, those that do not know this domain are left out."""
+    """The priors' scores; of the default priors, those that do not know this domain are left out."""
     from neurosym.experiments.benchmark import ask_priors
 
     def leave_out(name: str, error: InputError) -> None:

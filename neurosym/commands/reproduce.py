@@ -73,56 +73,27 @@ def reproduce(
     """
     # Before any network's library starts its threads: as many here as in workers, so that figures agree.
     os.environ.setdefault("OMP_NUM_THREADS", "1")
-    from neurosym.experiments.studies import study_names
+    from neurosym.experiments import imitation
+    from neurosym.experiments import reproduce as planning
 
     folder = out or Path("out") / f"reproduce-{name}{'' if scale is Scale.quick else f'-{scale.value}'}"
-    where = {"workers": workers, "engine": engine.value, "address": address}
-    if name != "soma" and name not in study_names():
-        raise UnknownNameError("experiment", name, ["soma", *study_names()])
+    given: dict[str, Any] = {"workers": workers, "engine": engine.value, "address": address, "say": say}
+    if name != "soma" and name not in imitation.study_names():
+        raise UnknownNameError("experiment", name, ["soma", *imitation.study_names()])
     # Ray says on stdout that a node is lost; stdout belongs to the answer.
     with redirect_stdout(sys.stderr):
         if name == "soma":
-            page = _planning(scale, seeds, pictures, prior, epochs, repeats, where, folder)
+            what = planning.soma_experiment(scale.value)
+            styles = tuple(style.value for style in pictures or ()) or what.styles
+            what = replace(what, splits=seeds or what.splits, styles=styles, methods=tuple(prior or what.methods))
+            what = replace(what, epochs=epochs, repeats=repeats)
+            with progress_bar("trainings and comparisons") as progress:
+                page = planning.report(what, planning.reproduce(what, folder, progress=progress, **given))
         else:
-            page = _study(name, scale, seeds, prior, epochs, where, folder)
+            study = imitation.study(name, scale.value)
+            study = replace(study, seeds=seeds or study.seeds, methods=tuple(prior or study.methods))
+            with progress_bar("trials") as progress:
+                results = imitation.reproduce_study(study, folder, epochs=epochs, progress=progress, **given)
+            page = imitation.report(results)
     print(page)  # a table of Markdown: rendered, its columns would not fit a terminal
     say(f"{folder}: results.csv, report.md and figures")
-
-
-def _study(
-    name: str,
-    scale: Scale,
-    seeds: int | None,
-    prior: list[str] | None,
-    epochs: int | None,
-    where: dict[str, Any],
-    folder: Path,
-) -> str:
-    from neurosym.experiments.imitation import report, reproduce_study, study
-
-    given = study(name, scale.value)
-    given = replace(given, seeds=seeds or given.seeds, methods=tuple(prior or given.methods))
-    with progress_bar("trials") as progress:
-        found = reproduce_study(given, folder, epochs=epochs, say=say, progress=progress, **where)
-    return report(found)
-
-
-def _planning(
-    scale: Scale,
-    seeds: int | None,
-    pictures: list[Pictures] | None,
-    prior: list[str] | None,
-    epochs: int | None,
-    repeats: int,
-    where: dict[str, Any],
-    folder: Path,
-) -> str:
-    from neurosym.experiments.reproduce import report, soma_experiment
-    from neurosym.experiments.reproduce import reproduce as rebuild
-
-    given = soma_experiment(scale.value)
-    styles = tuple(p.value for p in pictures) if pictures else given.styles
-    given = replace(given, splits=seeds or given.splits, styles=styles, methods=tuple(prior or given.methods))
-    given = replace(given, epochs=epochs, repeats=repeats)
-    with progress_bar("trainings and comparisons") as progress:
-        return report(given, rebuild(given, folder, say=say, progress=progress, **where))

@@ -1,1 +1,3 @@
-"""Everything that makes tables for the paper: comparisons, studies, their journals and reports."""
+"""Everything that makes tables for the paper. Comparisons of planners and priors: `benchmark`, `reporting`; Table II:
+`reproduce`; orders read from pictures: `studies`, `imitation`; all on one page: `results_page`.
+"""

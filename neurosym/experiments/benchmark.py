@@ -156,7 +156,7 @@ def run(
     *,
     workers: int | None = 1,
     journal: str | Path | None = None,
-    progress: Progress | None = None,
+    progress: Progress = lambda done, total: None,
     **where: Any,
 ) -> tuple[Run, ...]:
     """All runs of a comparison; the same, times excepted, for any number of workers.
@@ -182,14 +182,12 @@ def run(
         if missing:
             jobs.append((comparison, number, missing, own))
     total = len(comparison.numbers) * len(comparison.cells)
-    if progress is not None:
-        progress(len(done), total)
+    progress(len(done), total)
     # Processes, not threads: FCL holds the interpreter's lock. Problems are rebuilt there; FCL's objects cannot travel.
     for _, finished in run_tasks(lambda job: _solve_one(*job), jobs, workers=workers, **where):
         kept.add({key: asdict(result) for key, result in finished})
         done |= {((r.planner, r.prior, r.seed), r.number): r for _, r in finished}
-        if progress is not None:
-            progress(len(done), total)
+        progress(len(done), total)
     return tuple(done[cell, number] for cell in comparison.cells for number in comparison.numbers)
 
 
