@@ -20,7 +20,7 @@ from neurosym.geometry.paths.extraction import Failure, extract
 from neurosym.geometry.paths.grid import cells_of
 from neurosym.geometry.paths.path import Path, Track
 from neurosym.geometry.paths.voxel_moves import Separation, first_separation
-from neurosym.geometry.rigid_motions import Motion, shifted
+from neurosym.geometry.rigid_motions import Interpolation, shifted
 from neurosym.geometry.shapes import Body, Box, Mesh, Part
 from neurosym.testing.burrs import RINGS
 
@@ -167,7 +167,7 @@ def test_boxes_and_meshes_meet_where_intervals_say(low, size, way, meshes, turn)
     assembly = ns.Assembly((boxes("a", start), boxes("b", target)))
     assembly = moved(as_meshes(assembly) if meshes else assembly, turn, (50.0, 20.0, 3.0), 0.01)
     X = assembly.parts[0].X_WP[:3, :3]
-    found = Clearance(assembly, [0], [1]).first_hit(Motion(STAY, shifted(0.01 * X @ way), assembly.bounds[0]))
+    found = Clearance(assembly, [0], [1]).first_hit(Interpolation(STAY, shifted(0.01 * X @ way), assembly.bounds[0]))
     assert (found is not None) == (expected is not None)
     if found is not None and expected is not None:
         assert found[0] == pytest.approx(expected, abs=0.01)
@@ -183,7 +183,7 @@ def test_a_turning_bar_meets_a_wall_at_the_angle_that_trigonometry_gives(meshes)
     assembly = as_meshes(assembly) if meshes else assembly
     turned = np.eye(4)
     turned[:3, :3] = Rotation.from_euler("z", 90, degrees=True).as_matrix()
-    found = Clearance(assembly, [0], [1]).first_hit(Motion(STAY, turned, np.array([0.0, 0.0, 0.5])))
+    found = Clearance(assembly, [0], [1]).first_hit(Interpolation(STAY, turned, np.array([0.0, 0.0, 0.5])))
     assert found is not None
     angle = np.degrees(np.arcsin(1 / np.hypot(2, 0.01)) - np.arctan2(0.01, 2))
     assert found[0] * 90 == pytest.approx(angle, abs=0.1)

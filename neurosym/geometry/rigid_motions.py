@@ -13,8 +13,8 @@ Array = NDArray[np.float64]
 _UNTURNED = np.eye(3)
 
 
-class Motion:
-    """A motion between two poses in which a body's centre goes straight and its rotation turns evenly.
+class Interpolation:
+    """From one pose of a body to another: its centre goes straight and its rotation turns evenly.
 
     Attributes:
         first, second: float64 (4, 4): rigid motions of the world, applied to the body where it is assembled.

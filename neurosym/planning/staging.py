@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from neurosym.errors import InputError, UnknownNameError
 from neurosym.geometry.assembly import Assembly
-from neurosym.geometry.rigid_motions import Motion as Between
+from neurosym.geometry.rigid_motions import Interpolation as Between
 from neurosym.geometry.step_motion import Way
 
 if TYPE_CHECKING:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from neurosym.geometry.contact import collision
 from neurosym.geometry.mesh.inset import inset_vertices
-from neurosym.geometry.rigid_motions import Motion
+from neurosym.geometry.rigid_motions import Interpolation
 from neurosym.geometry.shapes import Body, Box, Mesh
 
 if TYPE_CHECKING:
@@ -102,7 +102,7 @@ class Clearance:
                 return self._named(i, j)
         return None
 
-    def first_hit(self, motion: Motion, other: Motion | None = None) -> tuple[float, int, int] | None:
+    def first_hit(self, motion: Interpolation, other: Interpolation | None = None) -> tuple[float, int, int] | None:
         """Where on a motion two bodies first overlap by more than the tolerance: share of the way, and the two.
 
         Args:
@@ -142,7 +142,9 @@ class Clearance:
                 best = (share, *self._named(i, j))
         return best
 
-    def _advance(self, i: int, j: int, a: Motion, b: Motion | None, travel: float, until: float) -> float | None:
+    def _advance(
+        self, i: int, j: int, a: Interpolation, b: Interpolation | None, travel: float, until: float
+    ) -> float | None:
         """Conservative advancement of one pair; the share of the way at which it meets, None if not before `until`."""
         first, second = self._a[i], self._b[j]
         share = 0.0
@@ -187,12 +189,12 @@ class Clearance:
         inner[:3, 3] = (X[:3, :3] @ self._middle + X[:3, 3] - self._middle) / self._scale
         return inner
 
-    def _scaled(self, motion: Motion) -> Motion:
+    def _scaled(self, motion: Interpolation) -> Interpolation:
         centre = (motion.centre - self._middle) / self._scale
-        return Motion(self._inner(motion.first), self._inner(motion.second), centre)
+        return Interpolation(self._inner(motion.first), self._inner(motion.second), centre)
 
     @staticmethod
-    def _travel(motion: Motion, corners: Array) -> Array:
+    def _travel(motion: Interpolation, corners: Array) -> Array:
         """How far (n,) any point of each body goes at most."""
         radii = np.linalg.norm(corners - motion.centre, axis=2).max(axis=1)
         travelled: Array = np.linalg.norm(motion.way) + motion.angle * radii
@@ -221,7 +223,7 @@ class Floor:
         """Whether the bodies reach below the plane, by more than the touching tolerance, at a pose (4, 4)."""
         return self._height(X) < 0.0
 
-    def first_hit(self, motion: Motion) -> float | None:
+    def first_hit(self, motion: Interpolation) -> float | None:
         """The share of the way at which the bodies first reach below the plane; None: never."""
         if not motion.angle:
             start, end = self._height(motion.first), self._height(motion.second)

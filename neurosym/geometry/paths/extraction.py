@@ -19,7 +19,7 @@ from neurosym.errors import InputError
 from neurosym.geometry.paths.lattice import Lattice
 from neurosym.geometry.paths.path import Kind, Path
 from neurosym.geometry.paths.removal import OutOfBudget, Removal
-from neurosym.geometry.rigid_motions import Motion, shifted
+from neurosym.geometry.rigid_motions import Interpolation, shifted
 
 if TYPE_CHECKING:
     from neurosym.geometry.assembly import Assembly
@@ -151,7 +151,7 @@ def _grown(removal: Removal, kind: Kind, rng: np.random.Generator) -> list[Array
         poses = _tree(removal, kind == "rigid", length, RESOLUTION / 2**attempt, until, seed)
         if poses is None:
             continue
-        if all(removal.is_clear(Motion(a, b, removal.centre)) for a, b in pairwise(poses)):
+        if all(removal.is_clear(Interpolation(a, b, removal.centre)) for a, b in pairwise(poses)):
             return _shortened(removal, poses, rng)
         if removal.spent():
             return None
@@ -251,7 +251,7 @@ def _shortened(removal: Removal, poses: list[Array], rng: np.random.Generator) -
         if len(poses) < 3 or removal.spent():
             break
         i, j = sorted(int(k) for k in rng.choice(len(poses), 2, replace=False))
-        if j - i > 1 and removal.is_clear(Motion(poses[i], poses[j], removal.centre)):
+        if j - i > 1 and removal.is_clear(Interpolation(poses[i], poses[j], removal.centre)):
             poses = [*poses[: i + 1], *poses[j:]]
     return poses
 

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from neurosym.geometry.paths.levels import commonest, levels_along
 from neurosym.geometry.paths.removal import Removal
-from neurosym.geometry.rigid_motions import Motion
+from neurosym.geometry.rigid_motions import Interpolation
 
 Array = NDArray[np.float64]
 
@@ -71,7 +71,7 @@ class Lattice:
                 leg = self._leg(a, b)
                 # Straight edges between boxes were answered exactly; others only at some places.
                 if not (self.removal.aligned and a[0] == b[0] == 0) and not all(
-                    self.removal.is_clear(Motion(x, y, self.removal.centre)) for x, y in pairwise(leg)
+                    self.removal.is_clear(Interpolation(x, y, self.removal.centre)) for x, y in pairwise(leg)
                 ):
                     self._known[_edge(a, b)] = False
                     bad = True
@@ -133,12 +133,12 @@ class Lattice:
     def _asked(self, a: Node, b: Node) -> bool:
         removal = self.removal
         if removal.aligned and a[0] == b[0] == 0:
-            return removal.is_clear(Motion(self._pose(a), self._pose(b), removal.centre))
+            return removal.is_clear(Interpolation(self._pose(a), self._pose(b), removal.centre))
         if removal.hit(self._pose(b)):
             return False
         leg = self._leg(a, b)
         if len(leg) == 2:
-            motion = Motion(leg[0], leg[1], removal.centre)
+            motion = Interpolation(leg[0], leg[1], removal.centre)
             count = max(int(np.ceil(np.linalg.norm(motion.way) / (0.2 * removal.assembly.smallest_extent))), 2)
             leg = [motion.at(k / count) for k in range(count + 1)]
         return not any(removal.hit(X) for X in leg[1:-1])
@@ -151,7 +151,7 @@ class Lattice:
         # The pivot stays in place: it is the fixed point of the turn, up to the turn's axis.
         turn: Array = last @ np.linalg.inv(first)
         fixed: Array = np.linalg.pinv(np.eye(3) - turn[:3, :3], rcond=1e-6) @ turn[:3, 3]
-        motion = Motion(np.eye(4), _about(fixed, turn[:3, :3]), fixed)
+        motion = Interpolation(np.eye(4), _about(fixed, turn[:3, :3]), fixed)
         return [first, *(motion.at(k / TURN_STEPS) @ first for k in range(1, TURN_STEPS)), last]
 
     def _turned(self, pose: Array, pivot: Array, axis: int, angle: float) -> Array:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from neurosym.errors import InputError
 from neurosym.geometry.paths.clearance import Clearance, Floor
-from neurosym.geometry.rigid_motions import Motion
+from neurosym.geometry.rigid_motions import Interpolation
 
 if TYPE_CHECKING:
     from neurosym.geometry.assembly import Assembly
@@ -43,9 +43,9 @@ class Track:
         first = min(max(int(np.floor(key)), 0), len(self.poses) - 2)
         return self.motion(first).at(min(max(key - first, 0.0), 1.0))
 
-    def motion(self, key: int) -> Motion:
+    def motion(self, key: int) -> Interpolation:
         """The motion from one pose, by its number, to the next."""
-        return Motion(self.poses[key], self.poses[key + 1], self.centre)
+        return Interpolation(self.poses[key], self.poses[key + 1], self.centre)
 
 
 @dataclass(frozen=True)

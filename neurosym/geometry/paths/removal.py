@@ -12,7 +12,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from neurosym.geometry.paths.clearance import Clearance, Floor
 from neurosym.geometry.paths.path import Kind, Path, apart, bodies_of, centre_of
-from neurosym.geometry.rigid_motions import Motion, shifted
+from neurosym.geometry.rigid_motions import Interpolation, shifted
 from neurosym.geometry.shapes import Box
 
 if TYPE_CHECKING:
@@ -91,7 +91,7 @@ class Removal:
             self.met[int(self.assembly.owners[pair[1]])] += 1
         return pair is not None
 
-    def is_clear(self, motion: Motion) -> bool:
+    def is_clear(self, motion: Interpolation) -> bool:
         """Whether a motion meets nothing on its way, by the check that misses nothing."""
         self.checks += 1
         if self.floor is not None and self.floor.first_hit(motion) is not None:
