@@ -53,10 +53,10 @@ def compare(seed: int, planned: bool) -> Comparison:
     problem = ns.load_domain("soma").problem(number, collapse="rigid")
     if planned:
         result = ns.solve(problem, rng=rng)  # each of the 240 has a plan under this rule
-        order, how = tuple(result.plan or ()), result.how
+        order, motions = tuple(result.plan or ()), result.motions
     else:
-        order, how = tuple(problem.actions[int(a)] for a in rng.permutation(len(problem.actions))), ()
-    report = replay_plan(problem, order, how, stop_at_failure=True)
+        order, motions = tuple(problem.actions[int(a)] for a in rng.permutation(len(problem.actions))), ()
+    report = replay_plan(problem, order, motions, stop_at_failure=True)
     checked = ns.validate(problem, order)
     step = report.failed_at
     said = checked.reason if step is None else report.steps[step].reason

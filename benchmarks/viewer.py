@@ -13,7 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from neurosym.geometry.assembly import Assembly
-from neurosym.planning.staging import Staging, steps_in_space
+from neurosym.geometry.step_motion import StepMotion
+from neurosym.planning.staging import staged
 from neurosym.viewer.scene import PlanScene
 from neurosym.viewer.server import LocalServer
 from neurosym.viewer.timeline import Timeline, part_bounds
@@ -40,10 +41,10 @@ def rate(scene: PlanScene, times: np.ndarray) -> float:
 
 assembly = parts()
 order = [assembly.names[i] for i in np.argsort(-part_bounds(assembly)[:, 1, 2], kind="stable")]
-motions = steps_in_space(assembly, assembly.names, order, [(n,) for n in order], [(0.0, 0.0, 1.0)] * len(order))
+up = [StepMotion((name,), (0.0, 0.0, 1.0)) for name in order]
 start = time.perf_counter()
-timeline = Timeline(Staging(assembly, assembly.names, motions))
-print(f"film of {len(motions)} steps: {time.perf_counter() - start:.2f} s")
+timeline = Timeline(staged(assembly, assembly.names, order, up))
+print(f"film of {len(order)} steps: {time.perf_counter() - start:.2f} s")
 server = LocalServer()
 scene = PlanScene(server)
 start = time.perf_counter()

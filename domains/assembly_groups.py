@@ -27,7 +27,7 @@ from domains.assembly_splits import Block, Splitter
 from domains.assembly_why import explain_groups
 from neurosym.errors import InputError
 from neurosym.geometry.assembly import Assembly
-from neurosym.geometry.step_motion import Way
+from neurosym.geometry.step_motion import StepMotion
 from neurosym.language import Action, Domain, Fluent, GroundProblem, Problem, Type
 from neurosym.language.explanation import WhyNot
 from neurosym.language.search_problem import Rejection, Step, Verdict
@@ -103,7 +103,7 @@ class GroupSemantics(Semantics):
     def search(self, problem: Problem) -> GroupSearch:
         return GroupSearch(self, problem.symbols)
 
-    def replay(self, problem: Problem, order: Sequence[str], how: Sequence[Any]) -> Validation:
+    def replay(self, problem: Problem, order: Sequence[str], motions: Sequence[StepMotion | None]) -> Validation:
         """Replays an order on blocks that are plain sets; each split is asked of the pairs concerned, afresh."""
         world = self.assembly.afresh()
         splitter = Splitter(world, self.setting)
@@ -123,13 +123,14 @@ class GroupSemantics(Semantics):
             block = next(b for b in blocks if name in b)
             asked = Block(world.mask(block), block == grounded)
             kept = world.mask(anchors & block)
-            if how and isinstance(how[step], Way):
-                verdict = splitter.check(asked, world.index[name], kept, how[step])
+            motion = motions[step] if motions else None
+            if motion is not None:
+                verdict = splitter.check(asked, world.index[name], kept, motion)
             else:
                 verdict = splitter.split(asked, world.index[name], kept)
-            if not verdict.holds:
+            if verdict.motion is None:
                 return Validation(False, step, verdict.because, f"Step {step}, {name}: {verdict.reason}")
-            leaving = frozenset(verdict.how.parts)
+            leaving = frozenset(verdict.motion.parts)
             blocks = [b for b in blocks if b != block] + [leaving, block - leaving]
             if block == grounded:
                 grounded = block - leaving
@@ -163,8 +164,8 @@ class GroupSemantics(Semantics):
             refused = {}
             for number in bits(block.parts & ~kept):
                 verdict = splitter.split(block, number, kept)
-                if verdict.holds:
-                    leaving = self.assembly.mask(verdict.how.parts)
+                if verdict.motion is not None:
+                    leaving = self.assembly.mask(verdict.motion.parts)
                     staying = block.parts & ~leaving
                     anchors = {True: 1 << number, False: kept}
                     done.append(self.assembly.names[number])
@@ -229,13 +230,13 @@ class GroupSearch:
         block = Block(blocks[place], place == 0)
         anchors = self.rules.anchors | self._used(symbols)
         verdict = self._split(block, number, anchors & block.parts)
-        if not verdict.holds:
+        if verdict.motion is None:
             # The answer depends on the block alone, and the block stays as it is until one of its parts is split off.
             others = [self._action_of[n] for n in bits(block.parts & ~anchors) if self._action_of[n] != action]
             until = tuple(others) or (action,)
             return Rejection(verdict.reason, verdict.because, until, proved=verdict.proved)
-        leaving = self.assembly.mask(verdict.how.parts)
-        return Step((self.symbols.apply(symbols, action), self._after(blocks, place, leaving)), verdict.how)
+        leaving = self.assembly.mask(verdict.motion.parts)
+        return Step((self.symbols.apply(symbols, action), self._after(blocks, place, leaving)), verdict.motion)
 
     def blocks(self, state: State) -> list[Block]:
         """The blocks of more than one part, the fixed ones counted as one."""

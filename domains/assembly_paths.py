@@ -10,7 +10,7 @@ import numpy as np
 from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.paths.grid import GridCells, cells_of
 from neurosym.geometry.paths.voxel_moves import Separation, Stuck, first_separation, separation_path
-from neurosym.geometry.step_motion import Way
+from neurosym.geometry.step_motion import StepMotion
 from neurosym.support.bitsets import bits
 from neurosym.support.words import listed
 
@@ -35,7 +35,7 @@ def ground_of(assembly: Assembly) -> float | None:
     return assembly.ground if assembly.has_table else None
 
 
-def way_out(assembly: Assembly, moving: int, among: int, *, shifting: bool) -> Way | NoWay:
+def way_out(assembly: Assembly, moving: int, among: int, *, shifting: bool) -> StepMotion | NoWay:
     """A path on which parts (a bitset), moving as one, leave the others in `among`.
 
     Args:
@@ -46,7 +46,7 @@ def way_out(assembly: Assembly, moving: int, among: int, *, shifting: bool) -> W
     """
     cells = grid_of(assembly)
 
-    def moves() -> Way | NoWay:
+    def moves() -> StepMotion | NoWay:
         assert cells is not None
         found = first_separation(
             cells,
@@ -58,7 +58,7 @@ def way_out(assembly: Assembly, moving: int, among: int, *, shifting: bool) -> W
         )
         return _way(cells, found)
 
-    def search() -> Way | NoWay:
+    def search() -> StepMotion | NoWay:
         from neurosym.geometry.paths.extraction import KINDS, Failure, extract
 
         rng = np.random.default_rng([zlib.crc32(f"{moving:x} {among:x}".encode())])
@@ -68,13 +68,13 @@ def way_out(assembly: Assembly, moving: int, among: int, *, shifting: bool) -> W
         )
         if isinstance(found, Failure):
             return NoWay(found.reason, found.because, found.proved and cells is not None)
-        return Way(found.leaving, path=found)
+        return found
 
     exact = shifting and cells is not None
     return assembly.remember(f"way out {moving:x} {among:x} {exact}", moves if exact else search)
 
 
-def separation(assembly: Assembly, block: int, *, standing: bool) -> Way | NoWay:
+def separation(assembly: Assembly, block: int, *, standing: bool) -> StepMotion | NoWay:
     """The first separation of a block of parts of cells into two, by shifts of groups, with the fewest moves.
 
     Args:
@@ -84,7 +84,7 @@ def separation(assembly: Assembly, block: int, *, standing: bool) -> Way | NoWay
     cells = grid_of(assembly)
     assert cells is not None
 
-    def search() -> Way | NoWay:
+    def search() -> StepMotion | NoWay:
         fixed = assembly.fixed_mask if standing else 0
         ground = ground_of(assembly) if standing else None
         found = first_separation(cells, block, fixed=fixed, ground=ground, max_states=MAX_STATES)
@@ -93,10 +93,9 @@ def separation(assembly: Assembly, block: int, *, standing: bool) -> Way | NoWay
     return assembly.remember(f"separation {block:x} {standing}", search)
 
 
-def _way(cells: GridCells, found: Separation | Stuck) -> Way | NoWay:
+def _way(cells: GridCells, found: Separation | Stuck) -> StepMotion | NoWay:
     if isinstance(found, Separation):
-        path = separation_path(cells, found)
-        return Way(path.leaving, path=path, moves=found.level)
+        return separation_path(cells, found)
     names = tuple(cells.names[p] for p in bits(found.block))
     said = f"No moves of groups separate what is wanted of {listed(names)}, in {found.explored:,} states."
     return NoWay(said, names, found.proved)

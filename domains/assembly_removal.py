@@ -12,7 +12,8 @@ from domains.assembly_paths import NoWay, ground_of, way_out
 from domains.assembly_why import explain_removal, refute_removal
 from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.blocking.sweep import exits_along
-from neurosym.geometry.step_motion import GROUND, Way
+from neurosym.geometry.paths.path_check import check_path
+from neurosym.geometry.step_motion import GROUND, StepMotion
 from neurosym.language import Action, Derived, Domain, Fluent, Problem, Simulation, State, Type, formulas, predicates
 from neurosym.language.explanation import WhyNot
 from neurosym.language.search_problem import Verdict
@@ -78,35 +79,33 @@ def can_leave(setting: Setting) -> Derived:
 
     def ask(world: Assembly, state: State, p: str) -> Verdict:
         verdict = straight.function(world, state, p)
-        if verdict.holds:
-            return Verdict(True, (), verdict.reason, how=Way.along((p,), verdict.how))
-        if setting.paths == "straight":
+        if verdict.holds or setting.paths == "straight":
             return verdict
         there = state.mask(present, world.names)
         found = way_out(world, 1 << world.index[p], there, shifting=not setting.gravity)
         if isinstance(found, NoWay):
             return Verdict(False, found.because, found.reason, proved=found.proved)
-        return Verdict(True, (), f"{p} is free by a path.", how=found)
+        return Verdict(True, (), f"{p} is free by a path.", motion=found)
 
-    def check(world: Assembly, state: State, how: Any, p: str) -> Verdict:
-        if not isinstance(how, Way) or how.parts != (p,):
+    def check(world: Assembly, state: State, motion: StepMotion, p: str) -> Verdict:
+        if motion.parts != (p,) or not (motion.direction or motion.tracks):
             return ask(world, state, p)
         there = state.mask(present, world.names)
-        if how.path is not None:
-            if setting.paths == "straight" or how.path.leaving != (p,):
-                return Verdict(False, (p,), f"{p} cannot go {how}: that is no straight line of its own.")
-            clear = how.path.check(world, there, ground=ground_of(world))
-            return Verdict(clear.holds, clear.parts, clear.reason or f"{p} is free {how}.", how=how)
-        direction = np.array(how.direction)
+        if motion.direction is None:
+            if setting.paths == "straight":
+                return Verdict(False, (p,), f"{p} cannot go {motion}: that is no straight line.")
+            clear = check_path(motion, world, there, ground=ground_of(world))
+            return Verdict(clear.holds, clear.parts, clear.reason or f"{p} is free {motion}.", motion=motion)
+        direction = np.array(motion.direction)
         if min(np.abs(direction - d).max() for d in setting.directions) > 1e-9:
-            return Verdict(False, (p,), f"{p} cannot go {how}: that is none of the problem's directions.")
+            return Verdict(False, (p,), f"{p} cannot go {motion}: that is none of the problem's directions.")
         hit = exits_along(world, world.index[p], direction, bits(there & ~(1 << world.index[p])))
         names = tuple(world.names[o] for o in hit)
         if world.has_table and direction[2] < -world.tolerances.parallel:
             names = (*names, GROUND)
         if names:
-            return Verdict(False, tuple(n for n in names if n != GROUND), f"{p} cannot go {how}: {listed(names)}.")
-        return Verdict(True, (), f"{p} is free {how}.", how=how)
+            return Verdict(False, tuple(n for n in names if n != GROUND), f"{p} cannot go {motion}: {listed(names)}.")
+        return Verdict(True, (), f"{p} is free {motion}.", motion=motion)
 
     return Derived("free", [part], ask, check=check, formula=straight.formula if setting.paths == "straight" else None)
 

@@ -18,7 +18,8 @@ from typing import TYPE_CHECKING
 from domains.assembly_paths import NoWay, grid_of, ground_of, separation, way_out
 from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.blocking.sweep import exits_along
-from neurosym.geometry.step_motion import Way
+from neurosym.geometry.paths.path_check import check_path
+from neurosym.geometry.step_motion import StepMotion
 from neurosym.language.predicates import stands
 from neurosym.language.search_problem import Verdict
 from neurosym.support.bitsets import bits
@@ -61,7 +62,7 @@ class Splitter:
         """The smallest half with `part`, without the parts in `anchor` (a bitset), that comes off.
 
         Returns:
-            A verdict: `how` is the `Way` of the half that leaves; where there is none, what `because` names keeps the
+            A verdict: its motion is that of the half that leaves; where there is none, what `because` names keeps the
             two together, or would fall.
         """
         # The fallen that a half takes along make it larger: the smallest is always looked at first.
@@ -75,9 +76,9 @@ class Splitter:
             _, _, kind, half = heapq.heappop(queue)
             standing = self._standing(block, half.leaving)
             if standing.holds:
-                held = standing.how.held if standing.how else ()
+                held = standing.motion.held if standing.motion else ()
                 names = self.assembly.in_mask(half.leaving)
-                return Verdict(True, how=Way.along(names, self.graph.vectors[half.direction]).joined(Way(held=held)))
+                return Verdict(True, motion=StepMotion(names, self.graph.vectors[half.direction], held=held))
             refused = refused or standing
             taken = half.leaving | self.assembly.mask(standing.because)
             grown = self._closure(taken, half.direction, block.parts)
@@ -93,39 +94,40 @@ class Splitter:
             return Verdict(False, refused.because, refused.reason, proved=False)
         return self._interlocked(block, part, anchor)
 
-    def check(self, block: Block, part: int, anchor: int, way: Way) -> Verdict:
-        """Whether a half may leave in a given way, asked of the pairs concerned alone."""
-        leaving = self.assembly.mask(way.parts)
+    def check(self, block: Block, part: int, anchor: int, motion: StepMotion) -> Verdict:
+        """Whether a half may leave by a given motion, asked of the pairs concerned alone."""
+        leaving = self.assembly.mask(motion.parts)
         rest = block.parts & ~leaving
-        said = ", ".join(way.parts)
+        said = ", ".join(motion.parts)
         apart = bool(leaving >> part & 1) != bool(leaving & anchor) and (anchor & rest) in (0, anchor)
         if leaving & ~block.parts or not apart:
-            return Verdict(False, way.parts, f"{said}: this does not split {self.assembly.names[part]} from its block.")
+            name = self.assembly.names[part]
+            return Verdict(False, motion.parts, f"{said}: this does not split {name} from its block.")
         if block.stands and leaving & self.assembly.fixed_mask:
-            return Verdict(False, way.parts, f"{said}: one of these is fixed.")
-        if way.path is not None:
-            if set(way.path.leaving) != set(way.parts) or self.setting.paths != "any":
-                return Verdict(False, way.parts, f"{said}: the path is not one of theirs.")
+            return Verdict(False, motion.parts, f"{said}: one of these is fixed.")
+        if motion.tracks and motion.direction is None:
+            if self.setting.paths != "any":
+                return Verdict(False, motion.parts, f"{said}: the path is not one of theirs.")
             ground = ground_of(self.assembly) if block.stands else None
-            clear = way.path.check(self.assembly, block.parts, ground=ground)
+            clear = check_path(motion, self.assembly, block.parts, ground=ground)
             if not clear.holds:
                 return Verdict(False, clear.parts, clear.reason)
         else:
-            d = self._number(way)
+            d = self._number(motion)
             if d < 0 or (block.stands and self.graph.into_table[d]):
-                return Verdict(False, (), f"{said} cannot go {way}: that is none of the problem's ways out.")
+                return Verdict(False, (), f"{said} cannot go {motion}: that is none of the problem's ways out.")
             for mine in bits(leaving):
                 hit = self.assembly.in_mask(self._hits(mine, d, rest))
                 if hit:
-                    return Verdict(False, hit, f"{said} cannot go {way}: {listed(hit)} would be hit.")
+                    return Verdict(False, hit, f"{said} cannot go {motion}: {listed(hit)} would be hit.")
         if block.stands and self.setting.gravity:
-            if len(way.held) > self.setting.held or self.assembly.mask(way.held) & ~rest:
-                return Verdict(False, way.held, f"{', '.join(way.held)} cannot all be held.")
-            answer = self.assembly.stability().standing(rest, held=self.assembly.mask(way.held))
+            if len(motion.held) > self.setting.held or self.assembly.mask(motion.held) & ~rest:
+                return Verdict(False, motion.held, f"{', '.join(motion.held)} cannot all be held.")
+            answer = self.assembly.stability().standing(rest, held=self.assembly.mask(motion.held))
             if not answer.stands:
                 falling = self.assembly.in_mask(answer.moving)
                 return Verdict(False, falling, f"Without {said}, {listed(falling)} would fall.")
-        return Verdict(True, how=way)
+        return Verdict(True, motion=motion)
 
     # -- straight lines ---------------------------------------------------------------------------------------
 
@@ -187,9 +189,9 @@ class Splitter:
         names = self.assembly.in_mask(leaving)
         return stands(self.assembly, block.parts & ~leaving, names, held=self.setting.held)
 
-    def _number(self, way: Way) -> int:
+    def _number(self, motion: StepMotion) -> int:
         for d, vector in enumerate(self.graph.vectors):
-            if way.direction is not None and max(abs(a - b) for a, b in zip(vector, way.direction)) < 1e-9:
+            if motion.direction is not None and max(abs(a - b) for a, b in zip(vector, motion.direction)) < 1e-9:
                 return d
         return -1
 
@@ -222,7 +224,7 @@ class Splitter:
             if bool(leaving >> part & 1) == bool(leaving & anchor):
                 reason = f"{name} stays with its anchor: {listed(found.parts)} can be separated first."
                 return Verdict(False, found.parts, reason)
-            return Verdict(True, how=found)
+            return Verdict(True, motion=found)
         out = way_out(self.assembly, 1 << part, block.parts, shifting=False)
         if isinstance(out, NoWay):
             # The part may come off together with others, which this search does not try.
@@ -230,4 +232,4 @@ class Splitter:
         standing = self._standing(block, 1 << part)
         if not standing.holds:
             return Verdict(False, standing.because, standing.reason, proved=False)
-        return Verdict(True, how=out if standing.how is None else out.joined(standing.how))
+        return Verdict(True, motion=out if standing.motion is None else out.joined(standing.motion))

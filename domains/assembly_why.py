@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from domains.assembly_paths import NoWay, way_out
 from neurosym.geometry.assembly import Assembly
-from neurosym.geometry.step_motion import Way
+from neurosym.geometry.step_motion import StepMotion
 from neurosym.language.explanation import Blocked, Cycle, Fall, WhyNot, blockers_of, smallest_cycle
 from neurosym.language.predicates import losses
 from neurosym.language.search_problem import Rejection
@@ -55,7 +55,7 @@ def explain_removal(
     for part in bits(there & ~assembly.fixed_mask):
         name = assembly.names[part]
         if not graph.free_directions(part, there):
-            way: Way | NoWay = NoWay("", (), True)
+            way: StepMotion | NoWay = NoWay("", (), True)
             if setting.paths == "any":
                 way = way_out(assembly, 1 << part, there, shifting=not setting.gravity)
             if isinstance(way, NoWay):

@@ -20,6 +20,7 @@ from domains.scrabble_demonstrations import demonstrate, picture_seed
 from domains.scrabble_rules import DOMAIN, Reference, all_slots_filled, laid, tile
 from domains.scrabble_tiles import COUNTS, LONGEST, N_TEST, N_TRAIN, SHORTEST, TILES, VALUES
 from neurosym.errors import InputError, UnknownNameError
+from neurosym.geometry.step_motion import StepMotion
 from neurosym.language import Atom, Problem
 from neurosym.language.demonstrations import Demonstrations
 from neurosym.language.problem_family import ProblemFamily, Progress
@@ -133,7 +134,7 @@ class ScrabbleFamily(ProblemFamily):
         details = problem.details
         return draw_word(details["word"], style_named(details["pictures"]), np.random.default_rng(details["seed"]))
 
-    def staging(self, problem: Problem, plan: Sequence[str], how: Sequence[Any]) -> Staging:
+    def staging(self, problem: Problem, plan: Sequence[str], motions: Sequence[StepMotion | None]) -> Staging:
         from domains.scrabble_staging import laid_out
 
         return laid_out(problem.details["start"], plan)

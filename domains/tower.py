@@ -20,6 +20,7 @@ from domains.tower_demonstrations import demonstrate
 from domains.tower_pictures import draw_offsets, picture_seed, setting_named, take_picture, take_pictures
 from domains.tower_variants import TALLEST, VARIANTS, blocks_of, sequences, split_numbers, towers
 from neurosym.errors import AssemblyError, InputError, UnknownNameError
+from neurosym.geometry.step_motion import StepMotion
 from neurosym.language import Problem
 from neurosym.language.demonstrations import Demonstrations
 from neurosym.language.problem_family import ProblemFamily, Progress
@@ -140,7 +141,7 @@ class TowerFamily(ProblemFamily):
     def observe(self, problem: Problem) -> NDArray[np.uint8]:
         return take_picture(problem.world, problem.details["pictures"], np.random.default_rng(problem.details["seed"]))
 
-    def staging(self, problem: Problem, plan: Sequence[str], how: Sequence[Any]) -> Staging:
+    def staging(self, problem: Problem, plan: Sequence[str], motions: Sequence[StepMotion | None]) -> Staging:
         tower = problem.world
         standing = tuple(str(atom.args[0]) for atom in problem.init if atom.predicate == rules.placed)
         order = (*standing, *plan)

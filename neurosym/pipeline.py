@@ -99,7 +99,7 @@ def search_and_check(
         if result.plan is None:
             continue
         if oracle == "geometry":
-            replayed = validate(problem, result.plan, result.how)
+            replayed = validate(problem, result.plan, result.motions)
         else:
             with open_oracle(problem, oracle) as fresh:
                 replayed = replay(fresh, result.plan)

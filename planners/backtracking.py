@@ -73,7 +73,7 @@ class _Search(Generic[S]):
         self.dead: set[tuple[S, int]] = set()
         self.path: list[_Frame[S]] = []
         self.prefix: list[int] = []
-        self.hows: list[Any] = []
+        self.motions: list[Any] = []
         self.deviated = False
 
     def run(self) -> PlanResult:
@@ -100,15 +100,15 @@ class _Search(Generic[S]):
                 continue
             if self.problem.is_goal(answer.state):
                 failed = self._first_guess_failed()
-                plan, hows = (*self.prefix, action), (*self.hows, answer.how)
-                return self.log.solved(plan, hows, scores=self.scores, first_guess_failed=failed)
+                plan, motions = (*self.prefix, action), (*self.motions, answer.motion)
+                return self.log.solved(plan, motions, scores=self.scores, first_guess_failed=failed)
             used = frame.used | 1 << action
             if (answer.state, used) in self.dead:
                 continue
             if self.log.out_of_budget():
                 return self.log.failed(Status.OUT_OF_BUDGET, first_guess_failed=self._first_guess_failed() or None)
             self.prefix.append(action)
-            self.hows.append(answer.how)
+            self.motions.append(answer.motion)
             self._enter(answer.state, used, remainder(frame.guess, action))
         return self.log.failed(Status.UNSOLVABLE, first_guess_failed=True)
 
@@ -124,7 +124,7 @@ class _Search(Generic[S]):
             self.promises[action].pop()
         if self.path:
             self.prefix.pop()
-            self.hows.pop()
+            self.motions.pop()
             self.deviated = True
 
     def _learn(self, frame: _Frame[S], action: int, rejection: Rejection) -> None:

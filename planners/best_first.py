@@ -103,7 +103,7 @@ class _Node(Generic[S]):
     depth: int
     parent: _Node[S] | None
     action: int
-    how: Any
+    motion: Any
     path_cost: float = 0.0
     log_policy: float = 0.0
     log_total: float = 0.0  # log of the summed probability of the candidates here
@@ -113,13 +113,13 @@ class _Node(Generic[S]):
     promises: dict[int, int] = field(default_factory=dict)  # refusals that hold below: action -> until mask
 
     def trace(self) -> tuple[list[int], list[Any]]:
-        """Actions and hows from the root to here."""
-        actions, hows, node = [], [], self
+        """Actions and motions from the root to here."""
+        actions, motions, node = [], [], self
         while node.parent is not None:
             actions.append(node.action)
-            hows.append(node.how)
+            motions.append(node.motion)
             node = node.parent
-        return actions[::-1], hows[::-1]
+        return actions[::-1], motions[::-1]
 
     def refutes(self, action: int) -> bool:
         """Whether a refusal on the way here promises that `action` would be refused."""
@@ -207,7 +207,7 @@ class _Search(Generic[S]):
                 node.promises[action] = mask
             return None
         cost = self._cost(node, action)
-        child = _Node(answer.state, node.used | 1 << action, node.depth + 1, node, action, answer.how)
+        child = _Node(answer.state, node.used | 1 << action, node.depth + 1, node, action, answer.motion)
         child.path_cost, child.bound = node.path_cost + cost, bound
         child.log_policy = node.log_policy - cost - node.log_total
         child.guess = remainder(node.guess, action)
@@ -286,8 +286,8 @@ class _Search(Generic[S]):
         return round(key / RESOLUTION) * RESOLUTION
 
     def _result(self, node: _Node[S]) -> PlanResult:
-        plan, hows = node.trace()
-        return self.log.solved(plan, hows, scores=self.scores, first_guess_failed=self.log.iterations > 0)
+        plan, motions = node.trace()
+        return self.log.solved(plan, motions, scores=self.scores, first_guess_failed=self.log.iterations > 0)
 
     def _stopped(self) -> bool:
         self.out_of_budget = self.log.out_of_budget()

@@ -31,7 +31,7 @@ class _Node(Generic[S]):
     state: S
     used: int
     is_goal: bool
-    edges: list[tuple[int, Any, _Node[S]]] = field(default_factory=list)  # action, how, where it leads
+    edges: list[tuple[int, Any, _Node[S]]] = field(default_factory=list)  # action, motion, where it leads
     orders: int = 0  # ways to the goal from here
 
 
@@ -73,7 +73,7 @@ class _Graph(Generic[S]):
                     if key not in below:
                         below[key] = _Node(*key, problem.is_goal(answer.state))
                         reached[below[key]] = (*prefixes[node], action)
-                    node.edges.append((action, answer.how, below[key]))
+                    node.edges.append((action, answer.motion, below[key]))
             prefixes, layer = reached, list(below.values())
         for nodes in reversed(self.layers):
             for node in nodes:
@@ -145,7 +145,7 @@ class Exhaustive(Planner):
         results = []
         for path in _cheapest(graph, scores, k):
             plan = [action for action, _, _ in path]
-            results.append(log.solved(plan, [how for _, how, _ in path], scores=scores))
+            results.append(log.solved(plan, [motion for _, motion, _ in path], scores=scores))
         return results, log, graph
 
 

@@ -49,7 +49,7 @@ class SwapRepair(Planner):
         scores = fitted(problem, scores)
         log = SearchLog(problem, budget)
         order = self._first_order(len(problem.actions), scores, rng)
-        state, hows = problem.initial, list[Any]()
+        state, motions = problem.initial, list[Any]()
         applicable: frozenset[int] | None = None
         done = 0
         while not problem.is_goal(state):
@@ -65,7 +65,7 @@ class SwapRepair(Planner):
                 answer = log.attempt(prefix, state, action)
                 if not isinstance(answer, Rejection):
                     state, applicable, done = answer.state, None, done + 1
-                    hows.append(answer.how)
+                    motions.append(answer.motion)
                     continue
             else:
                 log.refuse(prefix, action, f"{problem.actions[action]} is not applicable here.")
@@ -73,7 +73,7 @@ class SwapRepair(Planner):
                 return log.failed(Status.GAVE_UP, first_guess_failed=True)
             other = int(rng.integers(done, len(order)))
             order[done], order[other] = order[other], order[done]
-        return log.solved(order[:done], hows, scores=scores, first_guess_failed=log.iterations > 0)
+        return log.solved(order[:done], motions, scores=scores, first_guess_failed=log.iterations > 0)
 
     @staticmethod
     def _first_order(n_actions: int, scores: OrderScores | None, rng: np.random.Generator) -> list[int]:

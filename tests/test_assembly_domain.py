@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 import neurosym as ns
 from neurosym.geometry.shapes import Body, Mesh, Part
-from neurosym.geometry.step_motion import Way
+from neurosym.geometry.step_motion import StepMotion
 from neurosym.testing.domains import check_problem
 
 family = ns.load_domain("assembly")
@@ -146,7 +146,7 @@ def test_every_planner_and_every_prior_works(planner, prior):
         assert result.solved or planner == "swap-repair"
         if result.solved:
             assert ns.validate(problem, result.plan)
-            assert ns.validate(problem, result.plan, result.how)
+            assert ns.validate(problem, result.plan, result.motions)
 
 
 def test_outermost_first_makes_no_mistake_on_a_wall():
@@ -166,11 +166,11 @@ def test_a_plan_backwards_puts_together():
     assert result.plan == ("pin", "rail")
     back = result.reversed()
     assert back == result.plan.reversed() == ("rail", "pin")
-    assert [how.arrives for how in back.how] == [True, True]
-    out, back_in = result.how[0], back.how[1]
-    assert np.allclose(np.asarray(back_in), -np.asarray(out))
+    assert [motion.arrives for motion in back.motions] == [True, True]
+    out, back_in = result.motions[0], back.motions[1]
+    assert np.allclose(back_in.direction, np.negative(out.direction))
     assert back.reversed() == result.plan
-    assert back.reversed().how == result.how
+    assert back.reversed().motions == result.motions
     with pytest.raises(ns.InputError, match="with a plan"):
         ns.solve(made(LINKS, gravity=False)).reversed()
 
@@ -181,7 +181,7 @@ def test_a_plan_backwards_puts_together():
 def test_a_straight_line_burr_has_one_order():
     problem = made(STRAIGHT, gravity=False, fixed=["slide"])
     assert list(ns.load_planner("exhaustive").all_plans(problem.ground())) == [("pin", "rail")]
-    first, second = ns.solve(problem).how
+    first, second = ns.solve(problem).motions
     assert abs(first.direction[2]) == 1
     assert abs(second.direction[0]) == 1
 
@@ -193,11 +193,11 @@ def test_two_pairs_come_apart_in_groups_only(gravity):
     assert len(alone.why_not.cycle.parts) == 2
     together = solved(PAIRS, gravity=gravity, groups=True)
     assert len(together.plan) == len(PAIRS) - 1
-    assert set(together.how[0].parts) in ({"a", "b"}, {"c", "d"})
+    assert set(together.motions[0].parts) in ({"a", "b"}, {"c", "d"})
     assert ns.validate(made(PAIRS, gravity=gravity, groups=True), together.plan)
     fixed = solved(PAIRS, gravity=gravity, groups=True, fixed=["a"])
     assert len(fixed.plan) == 3
-    assert set(fixed.how[0].parts) == {"c", "d"}
+    assert set(fixed.motions[0].parts) == {"c", "d"}
 
 
 @pytest.mark.parametrize("gravity", [False, True])
@@ -207,7 +207,7 @@ def test_the_anchor_may_leave_what_stays(gravity):
     problem = made(hood, groups=True, directions="+z", gravity=gravity)
     assert problem.details["anchor"] == ["hood"]
     result = ns.solve(problem)
-    assert (result.plan, result.how[0].parts) == (("core",), ("hood",))
+    assert (result.plan, result.motions[0].parts) == (("core",), ("hood",))
     assert ns.validate(problem, result.plan)
     assert ns.solve(made(hood, groups=True, directions="+z", gravity=gravity, fixed=["hood"])).status is UNSOLVABLE
 
@@ -217,8 +217,8 @@ def test_a_group_takes_along_what_would_fall():
     problem = made(GATE, groups=True, before=[("post 0", "beam")], fixed=["post 1"])
     result = ns.solve(problem)
     assert result.solved
-    assert set(result.how[0].parts) == {"post 0", "beam"}
-    assert ns.validate(problem, result.plan, result.how)
+    assert set(result.motions[0].parts) == {"post 0", "beam"}
+    assert ns.validate(problem, result.plan, result.motions)
 
 
 def test_a_ball_in_a_bent_tunnel_takes_two_moves():
@@ -227,14 +227,14 @@ def test_a_ball_in_a_bent_tunnel_takes_two_moves():
         problem = made(BENT, gravity=False, paths="any", **options)
         result = ns.solve(problem)
         assert result.solved
-        assert (result.how[0].moves, result.how[0].path.kind) == (2, "moves")
-        assert ns.validate(problem, result.plan, result.how)
+        assert (result.motions[0].moves, result.motions[0].kind) == (2, "moves")
+        assert ns.validate(problem, result.plan, result.motions)
         check_problem(problem, walks=1)
-        again = Way.from_json(json.loads(json.dumps(result.how[0].as_json())))
-        assert ns.validate(problem, result.plan, (again, *result.how[1:]))
+        again = StepMotion.from_json(json.loads(json.dumps(result.motions[0].to_json())))
+        assert ns.validate(problem, result.plan, (again, *result.motions[1:]))
     standing = solved(BENT, paths="any")
-    assert standing.how[0].path.kind == "lattice"
-    assert np.asarray(standing.how[0]).shape[1:] == (4, 4)
+    assert standing.motions[0].kind == "lattice"
+    assert np.shape(standing.motions[0].to_json()["how"])[1:] == (4, 4)
 
 
 @pytest.mark.parametrize("options", [{}, {"groups": True}, {"paths": "any"}, {"paths": "any", "groups": True}], ids=str)
@@ -467,7 +467,7 @@ def test_soma_through_meshes_is_soma_through_cells(number):
     for options in ({"gravity": False}, {}):
         both = [ns.solve(family.problem(a, groups=True, **options)) for a in (cells, meshes)]
         assert both[0].plan == both[1].plan
-        assert [h.parts for h in both[0].how] == [h.parts for h in both[1].how]
+        assert [m.parts for m in both[0].motions] == [m.parts for m in both[1].motions]
 
 
 # -- options ----------------------------------------------------------------------------------------------------
@@ -524,32 +524,33 @@ def test_held_parts_are_named_and_their_number_is_kept():
     problem = made(GATE, before=[("post 0", "beam"), ("post 1", "beam")], held=1)
     result = ns.solve(problem)
     assert result.plan == ("post 0", "post 1", "beam") or result.plan == ("post 1", "post 0", "beam")
-    assert result.how[0].held == ("beam",)
-    assert "while beam is held" in str(result.how[0])
-    assert ns.validate(problem, result.plan, result.how)
-    greedy = dataclasses.replace(result.how[0], held=("beam", result.plan[1]))
-    assert not ns.validate(problem, result.plan, (greedy, *result.how[1:]))
-    idle = dataclasses.replace(result.how[0], held=())
-    assert ns.validate(problem, result.plan, (idle, *result.how[1:])).failed_at in (None, 0)
+    assert result.motions[0].held == ("beam",)
+    assert "while beam is held" in str(result.motions[0])
+    assert ns.validate(problem, result.plan, result.motions)
+    greedy = dataclasses.replace(result.motions[0], held=("beam", result.plan[1]))
+    assert not ns.validate(problem, result.plan, (greedy, *result.motions[1:]))
+    idle = dataclasses.replace(result.motions[0], held=())
+    assert ns.validate(problem, result.plan, (idle, *result.motions[1:])).failed_at in (None, 0)
 
 
 def test_a_replay_refuses_ways_that_are_wrong():
     problem = made(GATE)
     result = ns.solve(problem)
-    down = Way.along((result.plan[0],), (0, 0, -1))
-    assert not ns.validate(problem, result.plan, (down, *result.how[1:]))
-    slanted = Way.along((result.plan[0],), (0.6, 0, 0.8))
-    assert "none of the problem's directions" in ns.validate(problem, result.plan, (slanted, *result.how[1:])).reason
+    down = StepMotion.along((result.plan[0],), (0, 0, -1))
+    assert not ns.validate(problem, result.plan, (down, *result.motions[1:]))
+    slanted = StepMotion.along((result.plan[0],), (0.6, 0, 0.8))
+    refused = ns.validate(problem, result.plan, (slanted, *result.motions[1:]))
+    assert "none of the problem's directions" in refused.reason
     grouped = made(PAIRS, gravity=False, groups=True)
     plan = ns.solve(grouped)
-    wrong = dataclasses.replace(plan.how[0], parts=("a",))
-    assert not ns.validate(grouped, plan.plan, (wrong, *plan.how[1:]))
-    sideways = dataclasses.replace(plan.how[0], direction=(1.0, 0.0, 0.0))
-    assert "would be hit" in ns.validate(grouped, plan.plan, (sideways, *plan.how[1:])).reason
+    wrong = dataclasses.replace(plan.motions[0], parts=("a",))
+    assert not ns.validate(grouped, plan.plan, (wrong, *plan.motions[1:]))
+    sideways = dataclasses.replace(plan.motions[0], direction=(1.0, 0.0, 0.0))
+    assert "would be hit" in ns.validate(grouped, plan.plan, (sideways, *plan.motions[1:])).reason
     assert not ns.validate(grouped, plan.plan[:-1])
     assert not ns.validate(grouped, [plan.plan[0], plan.plan[0]])
-    with pytest.raises(ns.InputError, match="one `how` a step"):
-        ns.validate(grouped, plan.plan, plan.how[:1])
+    with pytest.raises(ns.InputError, match="one motion a step"):
+        ns.validate(grouped, plan.plan, plan.motions[:1])
 
 
 @pytest.mark.parametrize(

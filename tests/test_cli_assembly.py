@@ -16,7 +16,7 @@ import neurosym as ns
 from neurosym.cli import main
 from neurosym.commands.assemblies import FileOptions, problem_at
 from neurosym.commands.spread import spread
-from neurosym.geometry.step_motion import Way
+from neurosym.geometry.step_motion import StepMotion
 from neurosym.planning.plan_files import read_plan
 
 SHARED = Path(__file__).parents[1] / ".." / "shared" / "data"
@@ -99,8 +99,8 @@ def test_a_plan_is_written_with_all_it_takes_to_replay_it(capsys, gate, tmp_path
     assert document["steps"][0] == {"action": "beam", "how": [0.0, 0.0, 1.0], "parts": ["beam"]}
     saved = read_plan(tmp_path / "plan.json")
     assert saved.problem.name == "gate"
-    assert all(isinstance(how, Way) for how in saved.how)
-    assert ns.validate(saved.problem, saved.plan, saved.how)
+    assert all(isinstance(motion, StepMotion) for motion in saved.motions)
+    assert ns.validate(saved.problem, saved.plan, saved.motions)
     # Moved together, it is found beside the plan; changed, it is refused.
     there = tmp_path / "elsewhere"
     there.mkdir()
@@ -285,7 +285,7 @@ def test_what_is_up_in_the_files_can_be_said_and_is_kept_with_the_plan(capsys, t
     assert (code, found["plan"]) == (0, ["top", "base"])
     saved = read_plan(out)
     assert np.allclose(saved.problem.world.bounds, [[-0.5, -0.5, -0.5], [0.5, 0.5, 1.5]])
-    assert ns.validate(saved.problem, saved.plan, saved.how).ok
+    assert ns.validate(saved.problem, saved.plan, saved.motions).ok
 
 
 def test_faces_that_overlap_deeply_mate_where_that_is_said(capsys, tmp_path):

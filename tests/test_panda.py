@@ -24,7 +24,7 @@ def tower(number, variant="heights", **options):
     problem = ns.load_domain("tower").problem(number, variant=variant, **options)
     result = ns.solve(problem)
     assert result.plan is not None
-    return list(result.plan), stage(problem, result.plan, result.how)
+    return list(result.plan), stage(problem, result.plan, result.motions)
 
 
 def round_the_wall(q):

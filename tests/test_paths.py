@@ -18,10 +18,12 @@ from neurosym.geometry.mesh.inset import inset_vertices
 from neurosym.geometry.paths.clearance import Clearance
 from neurosym.geometry.paths.extraction import Failure, extract
 from neurosym.geometry.paths.grid import cells_of
-from neurosym.geometry.paths.path import Path, Track
+from neurosym.geometry.paths.path_check import check_path
 from neurosym.geometry.paths.voxel_moves import Separation, first_separation
 from neurosym.geometry.rigid_motions import Interpolation, shifted
 from neurosym.geometry.shapes import Body, Box, Mesh, Part
+from neurosym.geometry.step_motion import StepMotion, Track
+from neurosym.planning.staging import staged
 from neurosym.testing.burrs import RINGS
 
 STAY = np.eye(4)
@@ -35,6 +37,15 @@ def boxes(name, *corners) -> Part:
         X[:3, 3] = np.add(low, high) / 2
         bodies.append(Body(Box(np.subtract(high, low).astype(float)), X))
     return Part(name, tuple(bodies), np.eye(4))
+
+
+def straight(assembly: ns.Assembly, part: str, direction) -> StepMotion:
+    """One part leaves all others along a straight line."""
+    return staged(assembly, assembly.names, [part], [StepMotion.along([part], direction)]).motions[0]
+
+
+def poses(path: StepMotion) -> np.ndarray:
+    return path.tracks[0].poses
 
 
 def surface(corners) -> tuple[np.ndarray, np.ndarray]:
@@ -194,8 +205,9 @@ def test_nothing_jumps_over_a_sheet(meshes):
     ball = boxes("a", ((0, 0, 0), (1, 1, 1)))
     sheet = boxes("sheet", ((50, -5, -5), (50.001, 5, 5)))
     assembly = ns.Assembly((ball, sheet))
-    path = Path.of("straight", ["a"], np.array([STAY, shifted(np.array([100.0, 0, 0]))]), np.full(3, 0.5))
-    check = path.check(as_meshes(assembly) if meshes else assembly, 0b11)
+    track = Track(("a",), np.array([STAY, shifted(np.array([100.0, 0, 0]))]), np.full(3, 0.5))
+    path = StepMotion(("a",), tracks=(track,))
+    check = check_path(path, as_meshes(assembly) if meshes else assembly, 0b11)
     assert not check.holds
     assert set(check.parts) == {"a", "sheet"}
     assert check.key == pytest.approx(0.49, abs=1e-3)
@@ -209,8 +221,7 @@ def test_touch_and_little_overlaps_are_no_hits(overlap, holds, meshes):
     walls = boxes("walls", ((0, -1, 0), (3, 0, 1)), ((0, 1, 0), (3, 2, 1)), ((-1, -1, 0), (0, 2, 1)))
     assembly = ns.Assembly((drawer, walls))
     assembly = as_meshes(assembly) if meshes else assembly
-    path = Path.straight(assembly, 0b01, np.array([1.0, 0, 0]), 0b11)
-    assert path.check(assembly, 0b11).holds == holds
+    assert check_path(straight(assembly, "drawer", (1, 0, 0)), assembly, 0b11).holds == holds
 
 
 def test_meshes_put_together_from_others_touch_without_hitting():
@@ -224,7 +235,7 @@ def test_meshes_put_together_from_others_touch_without_hitting():
         for n, m in (("drawer", drawer), ("wall", wall))
     ]
     assembly = ns.Assembly(tuple(parts))
-    assert Path.straight(assembly, 0b01, np.array([1.0, 0, 0]), 0b11).check(assembly, 0b11).holds
+    assert check_path(straight(assembly, "drawer", (1, 0, 0)), assembly, 0b11).holds
 
 
 STEPS = [((0, 0, 0), (2, 1, 1)), ((0, 0, 1), (1, 2, 2)), ((0, 1, 0), (1, 2, 1))]
@@ -258,7 +269,7 @@ def test_two_moving_tracks_are_checked_against_each_other():
             Track(("a",), np.array([STAY, shifted(np.array([far_a, 0.0, 0.0]))]), np.full(3, 0.5)),
             Track(("b",), np.array([STAY, shifted(np.array([far_b, 0.0, 0.0]))]), np.array([4.5, 0.5, 0.5])),
         )
-        return Path("moves", tracks, ("a",)).check(assembly, 0b11)
+        return check_path(StepMotion(("a",), tracks=tracks, kind="moves"), assembly, 0b11)
 
     assert crossing(8.0, 6.0).holds is True
     met = crossing(8.0, -8.0)
@@ -268,33 +279,38 @@ def test_two_moving_tracks_are_checked_against_each_other():
 
 def test_the_check_sees_the_ground_and_whether_the_part_is_out():
     assembly = ns.Assembly.from_cells({"a": [(0, 0, 0)], "b": [(1, 0, 0)]})
-    down = Path.straight(assembly, 0b01, np.array([0, 0, -1.0]), 0b11)
-    assert down.check(assembly, 0b11).holds
-    low = down.check(assembly, 0b11, ground=0.0)
+    down = straight(assembly, "a", (0, 0, -1))
+    assert check_path(down, assembly, 0b11).holds
+    low = check_path(down, assembly, 0b11, ground=0.0)
     assert not low.holds
     assert "ground" in low.reason
-    short = Path.of("straight", ["a"], np.array([STAY, shifted(np.array([0, 0, 0.5]))]), np.full(3, 0.5))
-    said = short.check(assembly, 0b11)
+    track = Track(("a",), np.array([STAY, shifted(np.array([0, 0, 0.5]))]), np.full(3, 0.5))
+    short = StepMotion(("a",), tracks=(track,))
+    said = check_path(short, assembly, 0b11)
     assert not said.holds
     assert "not out" in said.reason
-    assert short.check(assembly, 0b01).holds
+    assert check_path(short, assembly, 0b01).holds
 
 
 def test_paths_survive_json_and_run_backwards():
     assembly = keyhole(0.05)
     path = extract(assembly, 0b01, 0b11, rng=rng())
-    assert isinstance(path, Path)
-    again = Path.from_json(json.loads(json.dumps(path.to_json())))
+    assert isinstance(path, StepMotion)
+    again = StepMotion.from_json(json.loads(json.dumps(path.to_json())))
     assert again.kind == path.kind
-    assert again.leaving == ("pin",)
-    assert np.array_equal(again.poses, path.poses)
-    assert again.length == path.length > 4
+    assert again.parts == ("pin",)
+    assert np.array_equal(poses(again), poses(path))
+    assert again.tracks[0].length == path.tracks[0].length > 4
     back = path.reversed()
-    assert np.array_equal(back.poses[0], path.poses[-1])
-    assert np.array_equal(back.poses[-1], STAY)
-    assert back.check(assembly, 0b11).holds
+    assert np.allclose(back.at(0.0)["pin"], poses(path)[-1])
+    assert np.allclose(back.at(1.0)["pin"], STAY)
+    assert check_path(back, assembly, 0b11).holds
+    # Files have poses in the order in which they are taken.
+    document = json.loads(json.dumps(back.to_json()))
+    assert document["how"] == document["path"]["tracks"][0]["poses"] == poses(path)[::-1].tolist()
+    assert np.array_equal(poses(StepMotion.from_json(document)), poses(path))
     half = path.tracks[0].at(0.5)
-    assert np.allclose(half[:3, 3], path.poses[1][:3, 3] / 2)
+    assert np.allclose(half[:3, 3], poses(path)[1][:3, 3] / 2)
 
 
 @pytest.mark.parametrize(
@@ -317,11 +333,13 @@ def test_what_is_no_path_is_refused(change):
         "leaving": ["a"],
         "tracks": [{"parts": ["a"], "centre": [0, 0, 0], "poses": [np.eye(4).tolist()] * 2}],
     }
-    assert Path.from_json(good).parts == ("a",)
+    step = {"how": [], "parts": ["a"]}
+    path = StepMotion.from_json({**step, "path": good})
+    assert path.parts == ("a",)
     with pytest.raises(InputError, match="Expected"):
-        Path.from_json(good | change)
+        StepMotion.from_json({**step, "path": good | change})
     with pytest.raises(UnknownNameError):
-        Path.from_json(good).check(ns.Assembly.from_cells({"b": [(0, 0, 0)], "c": [(1, 0, 0)]}), 0b11)
+        check_path(path, ns.Assembly.from_cells({"b": [(0, 0, 0)], "c": [(1, 0, 0)]}), 0b11)
 
 
 # -- searches -------------------------------------------------------------------------------------------------
@@ -330,23 +348,23 @@ def test_what_is_no_path_is_refused(change):
 @pytest.mark.parametrize("clearance", [0.0, 0.01, 0.05])
 def test_the_lattice_leads_out_of_a_keyhole_however_narrow(clearance):
     path = extract(keyhole(clearance), 0b01, 0b11, rng=rng(), kinds=("lattice",))
-    assert isinstance(path, Path)
+    assert isinstance(path, StepMotion)
     assert path.kind == "lattice"
-    assert len(path.poses) <= 6
-    assert path.poses[-1][2, 3] > 1.9
+    assert len(poses(path)) <= 6
+    assert poses(path)[-1][2, 3] > 1.9
 
 
 def test_the_same_keyhole_of_meshes_turned_and_in_metres():
     assembly = moved(as_meshes(keyhole(0.05)), (30, 20, 10), (5.0, -2.0, 1.0), 0.01)
     path = extract(assembly, 0b01, 0b11, rng=rng(), kinds=("lattice",))
-    assert isinstance(path, Path)
-    assert path.check(assembly, 0b11).holds
+    assert isinstance(path, StepMotion)
+    assert check_path(path, assembly, 0b11).holds
 
 
 def test_a_tree_of_translations_finds_the_keyhole_and_the_same_one_for_the_same_seed():
     found = [extract(keyhole(0.2), 0b01, 0b11, rng=rng(seed), kinds=("translation",)) for seed in (1, 1, 2)]
-    assert all(isinstance(path, Path) and path.kind == "translation" for path in found)
-    first, second, other = (path.poses for path in found)
+    assert all(isinstance(path, StepMotion) and path.kind == "translation" for path in found)
+    first, second, other = (poses(path) for path in found)
     assert np.array_equal(first, second)
     assert not np.array_equal(first, other)
     assert np.allclose(first[:, :3, :3], np.eye(3))
@@ -359,9 +377,9 @@ def test_a_hook_has_to_turn():
     assert stuck.because == ("plate",)
     assert "no translations lead out" in stuck.reason
     path = extract(hook(), 0b01, 0b11, rng=rng(), kinds=("rigid",))
-    assert isinstance(path, Path)
+    assert isinstance(path, StepMotion)
     assert path.kind == "rigid"
-    assert np.abs(path.poses[:, :3, :3] - np.eye(3)).max() > 0.1
+    assert np.abs(poses(path)[:, :3, :3] - np.eye(3)).max() > 0.1
 
 
 @pytest.mark.parametrize("clearance", [0.0, 0.1])
@@ -371,9 +389,9 @@ def test_a_key_turns_by_a_quarter(clearance):
     assert isinstance(stuck, Failure)
     assert stuck.proved
     path = extract(assembly, 0b01, 0b11, rng=rng())
-    assert isinstance(path, Path)
+    assert isinstance(path, StepMotion)
     assert path.kind == "rigid"
-    assert path.check(assembly, 0b11).holds
+    assert check_path(path, assembly, 0b11).holds
 
 
 def test_with_ground_below_nothing_leaves_through_it():
@@ -385,12 +403,12 @@ def test_with_ground_below_nothing_leaves_through_it():
     roof = boxes("roof", ((0, 0, 3), (5, 5, 4)))
     assembly = ns.Assembly((lid, frame, roof))
     free = extract(assembly, 0b001, 0b111, rng=rng(), kinds=("lattice",))
-    assert isinstance(free, Path)
-    assert free.poses[-1][2, 3] < -1
+    assert isinstance(free, StepMotion)
+    assert poses(free)[-1][2, 3] < -1
     held = extract(assembly, 0b001, 0b111, rng=rng(), kinds=("lattice",), ground=0.0)
     assert isinstance(held, Failure)
     assert held.proved
-    assert isinstance(extract(assembly, 0b001, 0b101, rng=rng(), kinds=("lattice",), ground=0.0), Path)
+    assert isinstance(extract(assembly, 0b001, 0b101, rng=rng(), kinds=("lattice",), ground=0.0), StepMotion)
 
 
 def test_a_part_that_comes_down_to_the_ground_leaves_under_the_walls():
@@ -402,8 +420,8 @@ def test_a_part_that_comes_down_to_the_ground_leaves_under_the_walls():
     )  # fmt: skip
     assembly = ns.Assembly((part, walls))
     path = extract(assembly, 0b01, 0b11, rng=rng(), kinds=("lattice",), ground=1.0)
-    assert isinstance(path, Path)
-    assert path.poses[1][2, 3] == pytest.approx(-1.0)
+    assert isinstance(path, StepMotion)
+    assert poses(path)[1][2, 3] == pytest.approx(-1.0)
     high = extract(assembly, 0b01, 0b11, rng=rng(), kinds=("lattice",), ground=1.5)
     assert isinstance(high, Failure)
     assert high.proved
@@ -433,9 +451,9 @@ def test_groups_leave_as_one():
     pieces = boxes("cap", ((1, 2, 4), (2, 3, 5)))
     assembly = ns.Assembly((*assembly.parts, pieces))
     path = extract(assembly, 0b101, 0b111, rng=rng())
-    assert isinstance(path, Path)
-    assert path.leaving == ("pin", "cap")
-    assert isinstance(extract(assembly, 0b001, 0b111, rng=rng(), kinds=("lattice",)), Path)
+    assert isinstance(path, StepMotion)
+    assert path.parts == ("pin", "cap")
+    assert isinstance(extract(assembly, 0b001, 0b111, rng=rng(), kinds=("lattice",)), StepMotion)
 
 
 def test_a_search_without_budget_proves_nothing():
@@ -478,6 +496,6 @@ def test_for_two_parts_the_lattice_and_the_exact_moves_agree(cells):
     assert grid is not None
     exact = first_separation(grid, 0b11)
     found = extract(assembly, 0b01, 0b11, rng=rng(), kinds=("lattice",))
-    assert isinstance(found, Path) == isinstance(exact, Separation)
+    assert isinstance(found, StepMotion) == isinstance(exact, Separation)
     if isinstance(found, Failure):
         assert found.proved

@@ -52,7 +52,7 @@ class ReturnsOneOfKBest(Exhaustive):
 class RepeatsTheBest(Exhaustive):
     def plans(self, problem, scores=None, *, k, budget=None, rng=None):
         found = super().plans(problem, scores, k=k, budget=budget, rng=rng)
-        return [replace(r, plan=found[0].plan, best_prefix=found[0].plan, how=()) for r in found]
+        return [replace(r, plan=found[0].plan, best_prefix=found[0].plan, motions=()) for r in found]
 
 
 class GivesUpOnProofs(Wrapped):
@@ -103,9 +103,9 @@ class LosesThePrefix(Wrapped):
         return replace(result, best_prefix=()) if result.solved and result.plan else result
 
 
-class ForgetsTheHows(Wrapped):
+class ForgetsTheMotions(Wrapped):
     def spoil(self, result, problem):
-        return replace(result, how=(object(),) * len(result.how)) if result.how else result
+        return replace(result, motions=(object(),) * len(result.motions)) if result.motions else result
 
 
 class IgnoresTheBudget(Wrapped):
@@ -148,7 +148,7 @@ class PrefersTheFirstAction(Planner):
     def plan(self, problem, scores=None, *, budget=None, rng=None):
         if scores is not None and scores.n_steps == 4 and np.isclose(scores.log_prob.max(), np.log(0.99)):
             return SwapRepair().plan(problem, scores, budget=budget, rng=rng)
-        log, state, prefix, hows = SearchLog(problem, budget), problem.initial, [], []
+        log, state, prefix, motions = SearchLog(problem, budget), problem.initial, [], []
         while not problem.is_goal(state):
             if log.out_of_budget():
                 return log.failed(Status.OUT_OF_BUDGET)
@@ -162,10 +162,10 @@ class PrefersTheFirstAction(Planner):
                 return log.failed(Status.GAVE_UP)
             state = answer.state
             prefix.append(a)
-            hows.append(answer.how)
+            motions.append(answer.motion)
         if scores is not None:
             scores = replace(scores, classes=tuple(problem.classes))
-        return log.solved(prefix, hows, scores=scores)
+        return log.solved(prefix, motions, scores=scores)
 
 
 class AttemptsWhatIsNoCandidate(Wrapped):
@@ -188,14 +188,14 @@ class AttemptsWhatIsNoCandidate(Wrapped):
         (RepeatsTheBest, "plans that differ"),
         (GivesUpOnProofs, "expected UNSOLVABLE"),
         (ProvesTooMuch, "got UNSOLVABLE"),
-        (ReversesItsPlan, "to replay|reaches the goal|a candidate|first reached|how ="),
+        (ReversesItsPlan, "to replay|reaches the goal|a candidate|first reached|motions ="),
         (MiscountsAttempts, r"\d attempts; got"),
         (MiscountsExpansions, r"\d expansions; got"),
         (HidesRefusals, "iterations or more"),
         (HidesBlame, "refusals in blame"),
         (InventsACost, "a cost of"),
         (LosesThePrefix, "the plan as best_prefix"),
-        (ForgetsTheHows, "how ="),
+        (ForgetsTheMotions, "motions ="),
         (IgnoresTheBudget, "no more attempts|OUT_OF_BUDGET"),
         (OverrunsByOne, "no more attempts"),
         (DrawsItsOwnSeed, "the same result from the same seed"),

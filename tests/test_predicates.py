@@ -55,7 +55,7 @@ def test_free_says_who_blocks_and_in_which_directions():
     assert "-z: the table" in blocked.reason
     open_ = ask(free, problem, "lid")
     assert open_.holds
-    assert open_.how == (0.0, 0.0, 1.0)
+    assert open_.motion.direction == (0.0, 0.0, 1.0)
     assert "+z" in open_.reason
 
 
@@ -112,7 +112,7 @@ def test_the_domain_of_the_documentation_plans():
     problem = take_apart(BOX_WITH_LID)
     result = ns.solve(problem)
     assert result.plan == ("lid", "ball", "box")
-    assert result.how[0] == (0.0, 0.0, 1.0)
+    assert (result.motions[0].parts, result.motions[0].direction) == (("lid",), (0.0, 0.0, 1.0))
     check_problem(problem)
     wrong = ns.validate(problem, ["ball"])
     assert (wrong.ok, wrong.failed_at) == (False, 0)

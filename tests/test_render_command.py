@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -12,7 +13,8 @@ from PIL import Image
 import neurosym as ns
 from neurosym.cli import main
 from neurosym.errors import InputError, MissingDependencyError
-from neurosym.planning.staging import Motion, Staging, stage
+from neurosym.geometry.step_motion import StepMotion, Track
+from neurosym.planning.staging import Staging, stage
 from neurosym.simulation import film_files, open_clients
 from neurosym.simulation.animation import LONGEST, SHORTEST_STEP, frames, pace
 from neurosym.simulation.captions import captioned
@@ -51,7 +53,7 @@ def reddish(picture):
 def soma(number=17):
     problem = ns.load_domain("soma").problem(number, collapse="rigid")
     result = ns.solve(problem)
-    return stage(problem, result.plan, result.how)
+    return stage(problem, result.plan, result.motions)
 
 
 @pytest.fixture(scope="module")
@@ -113,7 +115,7 @@ def test_exploded_parts_are_clear_of_one_another_and_went_the_way_they_leave():
             overlap = np.minimum(boxes[a][1], boxes[b][1]) - np.maximum(boxes[a][0], boxes[b][0])
             assert overlap.min() <= 1e-9, (a, b)
     for motion in staging.motions:
-        way, shift = motion.path[-1, :3, 3], shifts[motion.parts[0]]
+        way, shift = motion.tracks[0].poses[-1, :3, 3], shifts[motion.parts[0]]
         assert np.allclose(np.cross(way, shift), 0)
         assert way @ shift >= 0
     assert not explode(staging, spread=0.0)["B"].any()
@@ -123,9 +125,9 @@ def test_exploded_parts_are_clear_of_one_another_and_went_the_way_they_leave():
 
 def test_without_a_plan_parts_go_away_from_the_middle():
     assembly = ns.Assembly.from_cells(BRICKS)
-    shifts = explode(Staging(assembly, assembly.names, ()))
+    shifts = explode(Staging(assembly, assembly.names))
     assert shifts["high"][2] > 0 > shifts["low"][2]
-    picture = exploded_view(Staging(assembly, assembly.names, ()), size=SMALL)
+    picture = exploded_view(Staging(assembly, assembly.names), size=SMALL)
     assert picture.shape[1] == 96
     assert picture.shape[0] > 72, "a line of words below"
 
@@ -158,7 +160,7 @@ def test_a_group_leaves_together_and_is_taken_apart_by_itself():
     pairs = ns.Assembly.from_cells(burr("pairs").cells)
     problem = ns.load_domain("assembly").problem(pairs, groups=True, gravity=False)
     result = ns.solve(problem)
-    out = stage(problem, result.plan, result.how)
+    out = stage(problem, result.plan, result.motions)
     group = next(i for i, motion in enumerate(out.motions) if len(motion.parts) == 2)
     apart = next(i for i in range(group + 1, 3) if out.motions[i].parts[0] in out.motions[group].parts)
     assert set(out.motions[group].parts) == {"a", "b"}
@@ -167,7 +169,7 @@ def test_a_group_leaves_together_and_is_taken_apart_by_itself():
     assert company(out, group) == out.there(group)
     assert set(company(out, apart)) == {"a", "b"}, "nothing else is in the picture"
     assert " off " in describe(out, apart)
-    back = stage(problem, result.reversed(), result.reversed().how)
+    back = stage(problem, result.reversed(), result.reversed().motions)
     assert set(company(back, 2 - apart)) | set(back.motions[2 - apart].parts) == {"a", "b"}, "in the hand"
     assert not {"a", "b"} & set(company(back, 2 - group)), "and not in its place before it arrives"
     between = next(i for i in range(3) if i not in (2 - apart, 2 - group))
@@ -178,10 +180,11 @@ def test_what_made_way_goes_back_without_a_jump_and_what_is_held_is_set_off():
     assembly = ns.Assembly.from_cells({"a": [(0, 0, 0)], "b": [(2, 0, 0)]})
     path, aside = np.tile(np.eye(4), (2, 1, 1)), np.tile(np.eye(4), (2, 1, 1))
     path[1, 2, 3], aside[1, 0, 3] = 2.0, 2.0
-    steps = [Motion("a", ("a",), path, aside=((("b",), aside, np.zeros(3)),)), Motion("a", ("a",), path, held=("b",))]
+    up, right = Track(("a",), path, np.zeros(3)), Track(("b",), aside, np.zeros(3))
+    steps = [StepMotion(("a",), tracks=(up, right)), StepMotion(("a",), (0.0, 0.0, 1.0), (up,), held=("b",))]
     shots = []
     for motion in steps:
-        staging = Staging(assembly, assembly.names, (motion,), {"a": BLUE, "b": RED})
+        staging = Staging(assembly, assembly.names, ("a",), (motion,), {"a": BLUE, "b": RED})
         shots.append([shot[:72] for shot in frames(staging, size=SMALL)])
     moving, held, ends = pace(1)
     columns = [np.flatnonzero(red(shot).any(axis=0)).mean() for shot in shots[0][ends:-ends]]
@@ -193,14 +196,14 @@ def test_what_made_way_goes_back_without_a_jump_and_what_is_held_is_set_off():
     pink = [(np.abs(shot.astype(int) - (200, 0, 110)) < 40).all(axis=2).sum() for shot in shots[1]]
     assert min(pink[ends : ends + moving]) > 10
     assert max(pink[:ends]) == 0
-    assert describe(Staging(assembly, assembly.names, (steps[1],)), 0) == "remove a, along +z, b held"
+    assert describe(Staging(assembly, assembly.names, ("a",), (steps[1],)), 0) == "remove a, along +z, b held"
 
 
 def test_tiles_show_their_letters_from_a_steeper_side():
     problem = ns.load_domain("scrabble").problem(5)
     staging = stage(problem, ns.solve(problem).plan)
     assert best_camera(staging) is TOPS_CAMERA
-    bare = Staging(staging.assembly, staging.present, staging.motions, staging.colours)
+    bare = replace(staging, tops={})
     shots = [exploded_view(s, size=(240, 180), camera=TOPS_CAMERA, names=False) for s in (staging, bare)]
     dark = [(shot[:180] < 90).all(axis=2).sum() for shot in shots]
     assert dark[0] > 2 * dark[1]
@@ -209,7 +212,7 @@ def test_tiles_show_their_letters_from_a_steeper_side():
 def test_the_camera_turns_to_the_broad_side():
     def camera(*cells):
         assembly = ns.Assembly.from_cells({"bar": list(cells)})
-        return best_camera(Staging(assembly, assembly.names, ())).azimuth
+        return best_camera(Staging(assembly, assembly.names)).azimuth
 
     assert camera((0, 0, 0)) == DEFAULT_CAMERA.azimuth
     assert camera(*((x, 0, 0) for x in range(4))) < DEFAULT_CAMERA.azimuth < camera(*((0, y, 0) for y in range(4)))

@@ -24,9 +24,9 @@ import neurosym as ns
 from neurosym.cli import main
 from neurosym.errors import InputError, NeurosymError, UnknownNameError
 from neurosym.geometry.assembly import Body, Box, Mesh, Part
-from neurosym.geometry.step_motion import Way
+from neurosym.geometry.step_motion import StepMotion, Track
 from neurosym.planning.plan_files import read_plan
-from neurosym.planning.staging import Motion, Staging, building, pose_along, stage, steps_in_space
+from neurosym.planning.staging import Staging, building, stage, staged
 from neurosym.simulation import Physics, World, open_clients, replay_plan, replay_staging
 from neurosym.simulation.cutting import cut_into_convex
 from neurosym.simulation.decomposition import convex_pieces
@@ -45,10 +45,14 @@ BOX_WITH_LID = {
 SOMA = ns.load_domain("soma")
 
 
-def removal(cells, plan, how=(), *, size=1.0, **options):
+def removal(cells, plan, motions=(), *, size=1.0, **options):
+    """A replay of parts that leave one by one; a motion is one, or its direction, or nothing."""
     assembly = cells if isinstance(cells, ns.Assembly) else ns.Assembly.from_cells(cells, size)
-    motions = steps_in_space(assembly, assembly.names, plan, [[name] for name in plan], how)
-    return replay_staging(Staging(assembly, assembly.names, motions), **options)
+    given = [
+        m if isinstance(m, StepMotion) else StepMotion.along([name], m) if m else StepMotion((name,))
+        for name, m in zip(plan, motions or [None] * len(plan))
+    ]
+    return replay_staging(staged(assembly, assembly.names, plan, given), **options)
 
 
 def call(*arguments) -> int:
@@ -70,12 +74,12 @@ def test_a_motion_begins_at_rest_ends_at_its_end_and_carries_its_centre_straight
     path = np.tile(np.eye(4), (len(poses) + 1, 1, 1))
     for X, (x, y, z, *turn) in zip(path[1:], poses):
         X[:3, :3], X[:3, 3] = Rotation.from_rotvec(turn).as_matrix(), (x, y, z)
-    motion = Motion("go", ("a",), path, centre=np.array(centre))
-    assert np.allclose(motion.at(0), np.eye(4))
-    assert np.allclose(motion.at(1), path[-1], atol=1e-9)
-    back = Motion("come", ("a",), path, arrives=True, centre=np.array(centre))
-    assert np.allclose(back.at(share), motion.at(1 - share))
-    X = pose_along(path, share, centre)
+    motion = StepMotion(("a",), tracks=(Track(("a",), path, np.array(centre)),))
+    assert np.allclose(motion.at(0)["a"], np.eye(4))
+    assert np.allclose(motion.at(1)["a"], path[-1], atol=1e-9)
+    assert np.allclose(motion.reversed().at(share)["a"], motion.at(1 - share)["a"])
+    assert motion.reversed().reversed() == motion
+    X = motion.at(share)["a"]
     at = X[:3, :3] @ centre + X[:3, 3]
     ends = path[:, :3, :3] @ centre + path[:, :3, 3]
     off = [
@@ -88,26 +92,26 @@ def test_a_motion_begins_at_rest_ends_at_its_end_and_carries_its_centre_straight
 def test_a_plan_in_space_says_who_is_there_before_each_step():
     problem = SOMA.problem(17, collapse="rigid", removed=["V"])
     result = ns.solve(problem)
-    staging = stage(problem, result.plan, result.how)
+    staging = stage(problem, result.plan, result.motions)
     left = [n for n in problem.world.names if n != "V"]
     for i, name in enumerate(result.plan):
         assert staging.there(i) == tuple(left)
-        assert np.allclose(staging.motions[i].path[1, :3, :3], np.eye(3))
-        assert staging.motions[i].given
+        assert np.allclose(staging.motions[i].tracks[0].poses[1, :3, :3], np.eye(3))
         left.remove(name)
     assert staging.there(len(result.plan)) == ()
+    assert not staging.guessed
 
 
 def test_a_plan_backwards_arrives_along_the_same_lines():
     problem = ns.load_domain("assembly").problem(0)
     result = ns.solve(problem)
-    out = stage(problem, result.plan, result.how)
-    back = stage(problem, result.reversed(), result.reversed().how)
+    out = stage(problem, result.plan, result.motions)
+    back = stage(problem, result.reversed(), result.reversed().motions)
     assert set(back.present) == set(out.there(len(out.motions)))
     for one, other in zip(out.motions, back.motions[::-1]):
         assert other.arrives
         assert one.parts == other.parts
-        assert np.allclose(one.at(0.3), other.at(0.7))
+        assert np.allclose(one.at(0.3)[one.parts[0]], other.at(0.7)[one.parts[0]])
 
 
 def test_problems_without_parts_in_space_are_refused_with_a_remedy():
@@ -120,10 +124,12 @@ def test_problems_without_parts_in_space_are_refused_with_a_remedy():
         replay_plan(problem, problem.actions)
     with pytest.raises(UnknownNameError, match="'Q'"):
         replay_plan(SOMA.problem(17), ["Q"])
-    with pytest.raises(InputError, match="one `how` a step"):
+    with pytest.raises(InputError, match="one motion a step"):
         replay_plan(SOMA.problem(17), ["V"], [None, None])
-    with pytest.raises(InputError, match="direction of three numbers"):
+    with pytest.raises(InputError, match="one motion a step"):
         replay_plan(SOMA.problem(17, collapse="rigid"), ["B"], [[0, 0]])
+    with pytest.raises(InputError, match="direction of three numbers"):
+        StepMotion.along(["B"], [0, 0])
 
 
 # -- replays ----------------------------------------------------------------------------------------------------
@@ -133,7 +139,7 @@ def test_problems_without_parts_in_space_are_refused_with_a_remedy():
 def test_a_plan_that_geometry_accepts_leaves_the_rest_standing(number):
     problem = SOMA.problem(number, collapse="rigid")
     result = ns.solve(problem)
-    report = replay_plan(problem, result.plan, result.how)
+    report = replay_plan(problem, result.plan, result.motions)
     assert report.ok
     assert [step.action for step in report.steps] == list(result.plan)
     # Well under what counts as moved (0.2 of a cube): processors differ in how far Bullet lets a part settle.
@@ -174,9 +180,9 @@ def test_a_path_leads_round_what_a_straight_line_would_hit():
     assembly = assembly.with_fixed(["roof"])
     round_it = np.tile(np.eye(4), (3, 1, 1))
     round_it[1, :3, 3], round_it[2, :3, 3] = (1.0, 0, 0), (1.0, -3.0, 0)
-    how = Way(("hook",), (0.0, 0.0, 1.0))
-    assert removal(assembly, ["hook"], [how]).steps[0].in_the_way == ("roof",)
-    assert removal(assembly, ["hook"], [round_it]).steps[0].stood_still
+    path = StepMotion(("hook",), tracks=(Track(("hook",), round_it, np.full(3, 0.5)),))
+    assert removal(assembly, ["hook"], [(0.0, 0.0, 1.0)]).steps[0].in_the_way == ("roof",)
+    assert removal(assembly, ["hook"], [path]).steps[0].stood_still
 
 
 def test_pulled_sideways_a_part_drags_what_lies_on_it_lifted_it_does_not():
@@ -198,9 +204,8 @@ def test_a_part_that_cannot_move_is_jammed_when_pulled():
 def test_fixed_parts_stay_and_held_parts_are_held():
     cells = {"foot": [(0, 0, 0)], "arm": [(0, 0, 1), (1, 0, 1), (2, 0, 1)], "load": [(0, 0, z) for z in range(2, 8)]}
     assembly = ns.Assembly.from_cells(cells)
-    along = Way.along(("load",), (0, 0, 1))
-    assert set(removal(assembly, ["load"], [along]).steps[0].moved) == {"arm"}
-    held = Way(("load",), (0.0, 0.0, 1.0), held=("arm",))
+    assert set(removal(assembly, ["load"], [(0, 0, 1)]).steps[0].moved) == {"arm"}
+    held = StepMotion(("load",), (0.0, 0.0, 1.0), held=("arm",))
     assert removal(assembly, ["load"], [held]).ok
     fixed = removal(assembly.with_fixed(["arm"]), ["load", "foot"])
     assert fixed.ok
@@ -231,8 +236,8 @@ def test_a_group_is_taken_apart_and_put_together_in_the_hand():
     pairs = ns.Assembly.from_cells(burr("pairs").cells)
     problem = ns.load_domain("assembly").problem(pairs, groups=True, gravity=False)
     result = ns.solve(problem)
-    there = replay_plan(problem, result.plan, result.how)
-    back = replay_staging(stage(problem, result.reversed(), result.reversed().how), physics=Physics(gravity=0.0))
+    there = replay_plan(problem, result.plan, result.motions)
+    back = replay_staging(stage(problem, result.reversed(), result.reversed().motions), physics=Physics(gravity=0.0))
     for report in (there, back):
         assert report.ok, [step.reason for step in report.steps]
         assert not report.gravity
@@ -295,8 +300,7 @@ def test_a_window_is_told_of_every_time_step(bodies, monkeypatch):
     monkeypatch.setattr("neurosym.simulation.replay.WorldWindow", Watched)
     monkeypatch.setattr(World, "step", lambda self: steps.append(world_step(self)))
     assembly = ns.Assembly.from_cells({"low": [(0, 0, 0)], "high": [(0, 0, 1)]})
-    motions = steps_in_space(assembly, assembly.names, ["high"], [("high",)], [(0, 0, 1)])
-    staging = Staging(assembly, assembly.names, motions)
+    staging = staged(assembly, assembly.names, ["high"], [StepMotion(("high",), (0.0, 0.0, 1.0))])
     assert replay_staging(staging, bodies=bodies, window=True).ok
     assert ticks == list(range(1, len(steps) + 1))
 
@@ -512,7 +516,7 @@ def screen(monkeypatch):
 
 def test_a_window_shows_parts_in_their_colours_in_real_time_until_it_is_closed(screen):
     assembly = ns.Assembly.from_cells({"low": [(0, 0, 0)], "high": [(0, 0, 1)]})
-    staging = Staging(assembly, ("low",), (), {"low": (0.9, 0.0, 0.0), "high": (0.0, 0.0, 0.9)})
+    staging = Staging(assembly, ("low",), colours={"low": (0.9, 0.0, 0.0), "high": (0.0, 0.0, 0.9)})
     with World(assembly, present=["low"]) as world:
         try:
             window = WorldWindow(world, staging)

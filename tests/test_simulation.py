@@ -279,7 +279,7 @@ def test_rigid_parts_leave_along_a_free_line_or_not_at_all() -> None:
         assert isinstance(asked.attempt(asked.initial, box), Rejection)
         opened = asked.attempt(asked.initial, lid)
         assert isinstance(opened, Step)
-        assert opened.how == pytest.approx((0, 0, 1))
+        assert opened.motion.direction == pytest.approx((0, 0, 1))
         assert asked.candidates(opened.state) == [box, core]
         empty = asked.attempt(opened.state, core)
         assert isinstance(empty, Step)

@@ -23,9 +23,9 @@ from PIL import Image
 import neurosym as ns
 from neurosym.cli import main
 from neurosym.geometry.readers.meshes import signed_volume
+from neurosym.geometry.step_motion import StepMotion, Track
 from neurosym.language.options import options_of
-from neurosym.planning.planner import Plan
-from neurosym.planning.staging import Motion, Staging, stage, steps_in_space
+from neurosym.planning.staging import Staging, stage, staged
 from neurosym.testing import burrs
 from neurosym.viewer import panels, score_table
 from neurosym.viewer.attempts import BECAUSE, FEW, MOST_COUNTED, MOST_REFUSALS, attempts, most_refused
@@ -59,7 +59,7 @@ def soma():
 @pytest.fixture(scope="module")
 def film(soma):
     problem, result = soma
-    return Timeline(stage(problem, result.plan, result.how))
+    return Timeline(stage(problem, result.plan, result.motions))
 
 
 @pytest.fixture(scope="module")
@@ -112,8 +112,8 @@ def test_between_steps_each_part_is_in_the_work_or_set_down_before_it(soma, film
 
 def test_a_part_leaves_along_the_path_of_its_step_while_the_others_rest(soma, film):
     _, result = soma
-    for step, (name, how) in enumerate(zip(result.plan, result.how)):
-        i, direction = film.names.index(name), np.asarray(how)
+    for step, (name, motion) in enumerate(zip(result.plan, result.motions)):
+        i, direction = film.names.index(name), np.asarray(motion.direction)
         others = [k for k in range(len(film.names)) if k != i]
         before, far = film.motions(step), []
         for share in np.linspace(0.01, ON_PATH, 9):
@@ -122,15 +122,15 @@ def test_a_part_leaves_along_the_path_of_its_step_while_the_others_rest(soma, fi
             assert np.allclose(np.cross(X[i, :3, 3], direction), 0)
             far.append(X[i, :3, 3] @ direction)
         assert (np.diff(far) > 0).all()
-        assert far[-1] == pytest.approx(film.staging.motions[step].length)
+        assert far[-1] == pytest.approx(film.staging.motions[step].tracks[0].length)
         assert film.step_at(step) is None
         assert film.step_at(step + 0.5) == step
 
 
 def test_a_plan_that_puts_together_is_the_film_backwards(soma, film):
     problem, result = soma
-    back = Plan(result.plan, [ns_way(n, h) for n, h in zip(result.plan, result.how)]).reversed()
-    reverse = Timeline(stage(problem, back, back.how))
+    back = result.reversed()
+    reverse = Timeline(stage(problem, back, back.motions))
     assert reverse.backwards
     assert (reverse.where == film.where[::-1]).all()
     # Rows are in the order of either plan; what is in the work, or on its path, is where it was.
@@ -140,16 +140,10 @@ def test_a_plan_that_puts_together_is_the_film_backwards(soma, film):
         assert np.allclose(reverse.motions(film.n_steps - step - share)[there], film.motions(step + share)[there])
 
 
-def ns_way(name, how):
-    from neurosym.geometry.step_motion import Way
-
-    return Way.along((name,), how)
-
-
 def test_the_tower_is_built_from_above():
     problem = ns.load_domain("tower").problem(5)
     result = ns.solve(problem)
-    film = Timeline(stage(problem, result.plan, result.how))
+    film = Timeline(stage(problem, result.plan, result.motions))
     assert (film.where[0] == APART).all()
     assert (film.where[-1] == IN_PLACE).all()
     for step in range(film.n_steps):
@@ -187,10 +181,11 @@ def test_effects_say_what_leaves_and_what_comes(building):
 
     problem = problem_with(move)
     result = ns.solve(problem)
-    staging = stage(problem, result.plan, result.how)
+    staging = stage(problem, result.plan, result.motions)
     assert {m.arrives for m in staging.motions} == {building}
     assert staging.present == (("aside",) if building else world.names)
-    assert all(m.parts[0] in m.action and m.given for m in staging.motions)
+    assert all(m.parts[0] in action for action, m in zip(staging.plan, staging.motions))
+    assert not staging.guessed
     film = Timeline(staging)
     assert (film.where[-1] == (IN_PLACE if building else APART)).all()
     with pytest.raises(ns.InputError, match="in space"):
@@ -200,8 +195,7 @@ def test_effects_say_what_leaves_and_what_comes(building):
 def test_a_group_is_set_down_as_one_and_taken_apart_there():
     cells = {"base": [(0, 0, 0)], "a": [(0, 0, 1)], "b": [(0, 0, 2)]}
     world = ns.Assembly.from_cells(cells)
-    motions = steps_in_space(world, world.names, ["a", "b"], [("a", "b"), ("b",)], [UP, UP])
-    film = Timeline(Staging(world, world.names, motions))
+    film = Timeline(staged(world, world.names, ["a", "b"], [StepMotion(("a", "b"), UP), StepMotion(("b",), UP)]))
     first, second = film.shifts[1], film.shifts[2]
     assert (first[1] == first[2]).all()
     assert first[1].any()
@@ -215,8 +209,8 @@ def test_parts_that_make_way_are_back_in_place_afterwards():
     world = ns.Assembly.from_cells({"a": [(0, 0, 0)], "b": [(1, 0, 0)]})
     path, aside = np.tile(np.eye(4), (3, 1, 1)), np.tile(np.eye(4), (3, 1, 1))
     path[1:, 2, 3], aside[1:, 0, 3] = (1.0, 4.0), 0.5
-    motion = Motion("a", ("a",), path, aside=((("b",), aside, np.zeros(3)),))
-    film = Timeline(Staging(world, world.names, (motion,)))
+    motion = StepMotion(("a",), tracks=(Track(("a",), path, np.zeros(3)), Track(("b",), aside, np.zeros(3))))
+    film = Timeline(Staging(world, world.names, ("a",), (motion,)))
     assert film.motions(ON_PATH)[1, 0, 3] == pytest.approx(0.5)
     assert np.allclose(film.motions(1.0)[1], np.eye(4))
     assert film.motions(0.999)[1, 0, 3] < 0.05
@@ -227,7 +221,8 @@ def test_turning_paths_turn_the_part():
     path = np.tile(np.eye(4), (2, 1, 1))
     path[1, :3, :3] = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
     path[1, 2, 3] = 3.0
-    film = Timeline(Staging(world, world.names, (Motion("a", ("a",), path, centre=np.full(3, 0.5)),)))
+    track = Track(("a",), path, np.full(3, 0.5))
+    film = Timeline(Staging(world, world.names, ("a",), (StepMotion(("a",), tracks=(track,)),)))
     turns = film.frames(ON_PATH)[1]
     assert np.allclose(turns[0], [np.sqrt(0.5), 0, 0, np.sqrt(0.5)])
     assert np.allclose(turns[1], [1, 0, 0, 0])
@@ -236,8 +231,8 @@ def test_turning_paths_turn_the_part():
 
 def test_what_leaves_and_comes_back_is_in_place_again():
     world = ns.Assembly.from_cells({"a": [(0, 0, 0)], "b": [(1, 0, 0)]})
-    (out,) = steps_in_space(world, world.names, ["a"], [("a",)], [UP])
-    film = Timeline(Staging(world, world.names, (out, replace(out, arrives=True))))
+    out = StepMotion(("a",), UP)
+    film = Timeline(staged(world, world.names, ["out", "in"], [out, out.reversed()]))
     assert film.where[:, 0].tolist() == [IN_PLACE, APART, IN_PLACE]
     assert np.allclose(film.motions(2.0), np.eye(4))
     assert np.allclose(film.motions(1.001)[0, :3, 3], film.shifts[1, 0], atol=0.01)
@@ -246,7 +241,7 @@ def test_what_leaves_and_comes_back_is_in_place_again():
 def test_parts_that_were_gone_before_are_not_seen():
     problem = ns.load_domain("soma").problem(17, removed=["V"], **RIGID)
     result = ns.solve(problem)
-    film = Timeline(stage(problem, result.plan, result.how))
+    film = Timeline(stage(problem, result.plan, result.motions))
     gone = film.names.index("V")
     assert (film.where[:, gone] == ABSENT).all()
     assert [bool(film.visible(t)[gone]) for t in (0.0, 2.5, 6.0)] == [False] * 3
@@ -260,7 +255,7 @@ def removals(draw):
     world = ns.Assembly.from_cells({f"p{i}": [(i, 0, z) for z in range(c)] for i, c in enumerate(columns)})
     order = draw(st.permutations(world.names))
     axes = draw(st.lists(st.sampled_from([UP, (0.0, 1.0, 0.0), (0.0, -1.0, 0.0)]), min_size=n, max_size=n))
-    return Staging(world, world.names, steps_in_space(world, world.names, order, [(name,) for name in order], axes))
+    return staged(world, world.names, order, [StepMotion((name,), axis) for name, axis in zip(order, axes)])
 
 
 @settings(max_examples=25, deadline=None)
@@ -282,8 +277,7 @@ def test_the_film_has_no_cuts_and_nothing_is_set_down_on_anything(staging):
 
 def test_many_parts_are_set_down_wide_so_that_the_work_stays_in_sight():
     world = ns.Assembly.from_cells({f"p{x}{y}": [(x, y, 0)] for x in range(7) for y in range(7)})
-    motions = steps_in_space(world, world.names, world.names, [(n,) for n in world.names], [UP] * 49)
-    film = Timeline(Staging(world, world.names, motions))
+    film = Timeline(staged(world, world.names, world.names, [StepMotion((n,), UP) for n in world.names]))
     boxes = film.bounds_at_rest + film.shifts[-1][:, None]
     wide, deep = np.ptp(boxes[..., :2].reshape(-1, 2), axis=0)
     assert deep < 0.6 * wide
@@ -398,45 +392,46 @@ def test_panels_escape_what_names_hold(shown):
     assert follower(["</script>"] * 3, 1.0, 1.5).count("</script>") == 1
 
 
-def staged(shown, motions, **change):
+def changed(shown, plan, motions, guessed=(), **change):
     """`shown` with the steps of a plan of other motions, each in a search that found it."""
-    film = Timeline(Staging(shown.timeline.staging.assembly, shown.timeline.names, tuple(motions)))
-    search = replace(shown.search, steps=tuple(m.action for m in motions), refusals=())
+    assembly = shown.timeline.staging.assembly
+    film = Timeline(Staging(assembly, assembly.names, tuple(plan), tuple(motions), guessed=frozenset(guessed)))
+    search = replace(shown.search, steps=tuple(plan), refusals=())
     return replace(shown, timeline=film, search=replace(search, **change))
 
 
 def test_ways_that_were_looked_for_are_remarked_on_once(shown):
-    motions = shown.timeline.staging.motions
+    plan, motions = shown.timeline.staging.plan, shown.timeline.staging.motions
     given = steps(shown, None)
     assert "looked for" not in given
-    without = staged(shown, [replace(m, given=False) for m in motions])
+    without = changed(shown, plan, motions, range(len(plan)))
     assert steps(without, None).count("looked for") == 1
     assert "looked for" not in caption(without, 0.5)
-    mixed = steps(staged(shown, [replace(m, given=i != 2) for i, m in enumerate(motions)]), None)
+    mixed = steps(changed(shown, plan, motions, [2]), None)
     assert mixed.count("looked for") == 1
     rows = [row for row in mixed.split("<li")[1:] if "data-step" in row]
     assert [" *</li>" in row for row in rows] == [i == 2 for i in range(len(motions))]
 
 
 def test_what_goes_together_is_held_or_makes_way_is_said(shown):
-    first = shown.timeline.staging.motions[0]
-    a, b, c, d = [n for n in shown.timeline.names if n != first.action][:4]
-    aside = ((c,), first.path, first.centre)
-    group = replace(first, parts=(first.action, a, b), aside=(aside,), held=(d,))
-    one = staged(shown, [group])
+    action, first = shown.timeline.staging.plan[0], shown.timeline.staging.motions[0]
+    a, b, c, d = [n for n in shown.timeline.names if n != action][:4]
+    tracks = tuple(replace(first.tracks[0], parts=parts) for parts in ((action, a, b), (c,)))
+    one = changed(shown, [action], [replace(first, parts=(action, a, b), tracks=tracks, held=(d,))])
     said = caption(one, 0.5)
-    assert f"<b>{first.action}, {a}, {b}</b> together leave " in said
+    assert f"<b>{action}, {a}, {b}</b> together leave " in said
     assert f"{c} making way" in said
     assert f">{d}</span> is held" in said
     assert f"together with {a}, {b}, {c} making way, while {d} is held" in steps(one, 0)
-    other = caption(staged(shown, [replace(group, parts=(a, b))]), 0.5)
-    assert f"<b>{first.action}</b>: <b>{a}, {b}</b> together leave" in other
+    tracks = tuple(replace(first.tracks[0], parts=parts) for parts in ((a, b), (c,)))
+    other = caption(changed(shown, [action], [replace(first, parts=(a, b), tracks=tracks)]), 0.5)
+    assert f"<b>{action}</b>: <b>{a}, {b}</b> together leave" in other
     assert "together" not in caption(shown, 0.5)
 
 
 def test_a_long_list_keeps_the_step_under_way_in_sight(shown):
-    first = shown.timeline.staging.motions[0]
-    long = staged(shown, [first] * 100)
+    staging = shown.timeline.staging
+    long = changed(shown, staging.plan[:1] * 100, staging.motions[:1] * 100)
     assert steps(long, None).count("<li") == 100
     assert steps(long, 50, all_of_them=True).count("<li") == 100
     for now in (0, 3, 50, 97, 99):
@@ -452,11 +447,12 @@ def test_a_long_list_keeps_the_step_under_way_in_sight(shown):
 
 def test_where_there_is_no_plan_the_panel_says_why(shown):
     never = {"status": ns.Status.UNSOLVABLE, "why_not": ("a blocks b", "b blocks a")}
-    stuck = staged(shown, [], **never)
+    stuck = changed(shown, [], [], **never)
     assert "No plan, and no step to show" in steps(stuck, None)
     assert steps(stuck, None).count("blocks") == 2
     assert "no plan" in caption(stuck, 0.0)
-    some = staged(shown, shown.timeline.staging.motions[:2], refusals=shown.search.refusals[:1], **never)
+    staging = shown.timeline.staging
+    some = changed(shown, staging.plan[:2], staging.motions[:2], refusals=shown.search.refusals[:1], **never)
     assert "the longest prefix that works is shown" in steps(some, None)
     assert "tab Search" in steps(some, None)
     assert "no plan" not in caption(shown, 0.0)
@@ -659,7 +655,7 @@ def test_a_plan_is_opened_as_it_was_made(plan_file):
     assert shown.search.counts["iterations"] == document["iterations"]
     assert len(shown.search.refusals) == len(document["refusals"])
     assert shown.search.scores is not None
-    assert all(m.given for m in shown.timeline.staging.motions)
+    assert not shown.timeline.staging.guessed
     assert (source.query.domain, source.query.number, source.query.prior) == ("soma", 17, "random")
     assert source.query.options["collapse"] == "rigid"
 
@@ -765,7 +761,7 @@ def test_the_film_of_a_prefix_shows_how_its_steps_are_done(tmp_path):
     first = shown.timeline.staging.motions[0]
     assert not first.arrives
     assert len(first.parts) == 2
-    assert first.given
+    assert not shown.timeline.staging.guessed
 
 
 def test_an_assembly_is_planned_as_plan_plans_it(tmp_path, capsys):
@@ -978,9 +974,9 @@ def test_parts_are_seen_in_their_own_colours(tab, viewer, shown):
 
 
 def test_what_is_held_has_a_bold_outline_while_the_step_is_done(viewer, shown):
-    motions = shown.timeline.staging.motions
-    held = motions[-1].action
-    viewer.show(staged(shown, [replace(motions[0], held=(held,)), *motions[1:]]))
+    plan, motions = shown.timeline.staging.plan, shown.timeline.staging.motions
+    held = plan[-1]
+    viewer.show(changed(shown, plan, [replace(motions[0], held=(held,)), *motions[1:]]))
     outlines = viewer.scene._outlines
     usual = {name: outline.thickness for name, outline in outlines.items()}
     viewer.scene.show(0.5)

@@ -26,8 +26,6 @@ from neurosym.commands.common import (
     write_json,
 )
 from neurosym.errors import InputError
-from neurosym.geometry.blocking.directions import in_words
-from neurosym.geometry.step_motion import Way
 from neurosym.language.options import check_options
 from neurosym.language.problem_family import ProblemFamily
 from neurosym.planning.plan_files import SCHEMA
@@ -218,12 +216,12 @@ def _header(domain: str, problem: Problem, number: int | None, options: dict[str
 
 
 def _result(result: PlanResult) -> dict[str, Any]:
-    hows = result.how or (None,) * len(result.plan or ())
+    steps = zip(result.plan or (), result.motions or (None,) * len(result.plan or ()))
     return {
         "status": result.status.name,
         "sentence": result.status.sentence,
         "plan": None if result.plan is None else list(result.plan),
-        "steps": [{"action": a, **_said(how)} for a, how in zip(result.plan or (), hows)],
+        "steps": [{"action": a, **(motion.to_json() if motion else {"how": None})} for a, motion in steps],
         "best_prefix": list(result.best_prefix),
         "refusals": [
             {"after": list(r.after), "action": r.action, "reason": r.reason, "because": list(r.because)}
@@ -236,11 +234,6 @@ def _result(result: PlanResult) -> dict[str, Any]:
         "cost": result.cost,
         "why_not": None if result.why_not is None else result.why_not.as_json(),
     }
-
-
-def _said(how: Any) -> dict[str, Any]:
-    said: dict[str, Any] = how.as_json() if isinstance(how, Way) else {"how": how}
-    return said
 
 
 def _show(problem: Problem, results: Sequence[PlanResult], answer: dict[str, Any]) -> None:
@@ -270,12 +263,12 @@ def _show(problem: Problem, results: Sequence[PlanResult], answer: dict[str, Any
 
 def _show_steps(steps: Sequence[str], result: PlanResult) -> None:
     """The plan and the refusals in the order in which they came; those off the plan's path say after what."""
-    hows = result.how or (None,) * len(steps)
+    motions = [f"  {motion}" if motion else "" for motion in result.motions] or [""] * len(steps)
     shown = 0
 
     def advance(to: int) -> int:
         for i in range(shown, to):
-            print(f"  {i + 1}. {steps[i]}{_how(hows[i])}")
+            print(f"  {i + 1}. {steps[i]}{motions[i]}")
         return max(shown, to)
 
     for refusal in result.blame:
@@ -286,13 +279,3 @@ def _show_steps(steps: Sequence[str], result: PlanResult) -> None:
         elsewhere = "" if on_path and depth == shown else f" (after {joined(refusal.after) or 'nothing'})"
         print(f"     not {refusal.action}{elsewhere}: {refusal.reason}")
     advance(len(steps))
-
-
-def _how(how: Any) -> str:
-    if how is None:
-        return ""
-    if isinstance(how, Way):
-        return f"  {how}"
-    if isinstance(how, tuple | list) or hasattr(how, "tolist"):
-        return f"  along {in_words(how)}" if len(how) == 3 else f"  {how}"
-    return f"  {how}"

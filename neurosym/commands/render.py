@@ -109,7 +109,7 @@ def _staging(
     domain = saved.document["domain"]
     if what != domain and not Path(what).exists():
         raise InputError(f"Expected what {plan} was made for, {domain!r} or the path of its assembly; got {what!r}.")
-    return stage(saved.problem, saved.plan, saved.how), saved.problem.name
+    return stage(saved.problem, saved.plan, saved.motions), saved.problem.name
 
 
 def _at_rest(what: str, number: int | None, files: FileOptions, options: dict[str, Any]) -> tuple[Staging, str]:

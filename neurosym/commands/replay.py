@@ -53,7 +53,7 @@ def replay(
     report = replay_plan(
         saved.problem,
         saved.plan,
-        saved.how,
+        saved.motions,
         pulled=pull,
         bodies=None if bodies is None else bodies.value,
         friction=friction,

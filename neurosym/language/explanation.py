@@ -9,11 +9,10 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from neurosym.geometry.blocking.directions import in_words
 from neurosym.geometry.blocking.graph import BlockingGraph
 from neurosym.geometry.step_motion import GROUND, Vector
 from neurosym.support.bitsets import bits
-from neurosym.support.words import LISTED, listed
+from neurosym.support.words import LISTED, in_words, listed
 
 
 @dataclass(frozen=True)

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from neurosym.errors import ContractError, DefinitionError, UnknownNameError
-from neurosym.geometry.step_motion import Way
+from neurosym.errors import ContractError, DefinitionError, InputError, UnknownNameError
+from neurosym.geometry.step_motion import StepMotion
+from neurosym.language.actions import moved_parts
 from neurosym.language.problem import check_precedence
 from neurosym.language.search_problem import Rejection, Step, Verdict
 from neurosym.language.terms import Atom, Derived, Fluent, Literal
@@ -49,6 +50,7 @@ class GroundProblem:
         done = {a: len(self._bits) + k for k, a in enumerate(sorted({a for a, _ in precedence}))}
 
         self._pos, self._neg, self._add, self._del = [], [], [], []
+        self._effects = [instance.eff for instance in reachable]
         self._derived: list[list[tuple[Derived, tuple[str, ...], bool]]] = []
         for i, instance in enumerate(reachable):
             pos = self._mask(p.atom for p in instance.fluents if p.positive)
@@ -95,17 +97,19 @@ class GroundProblem:
         """Ask the derived predicates of `action`, in their order; the first refusal is the answer."""
         if (state & self._pos[action]) != self._pos[action] or state & self._neg[action]:
             return self._not_applicable(state, action)
-        how = None
+        motion: StepMotion | None = None
         view = BitState(self, state)
         for predicate, args, positive in self._derived[action]:
             verdict = _ask(predicate, self.world, view, args)
             if verdict.holds is not positive:
                 return self._rejection(state, action, predicate, args, positive, verdict)
-            if how is None or verdict.how is None:
-                how = how or verdict.how
-            elif isinstance(how, Way) and isinstance(verdict.how, Way):
-                how = how.joined(verdict.how)
-        return Step(self.apply(state, action), how)
+            if verdict.motion is not None:
+                stated = _as_motion(predicate, verdict.motion)
+                motion = stated if motion is None else motion.joined(stated)
+        if motion is not None:
+            parts, arrive = moved_parts(self._effects[action], getattr(self.world, "names", ()))
+            motion = motion.of_parts(parts, arrive=arrive)
+        return Step(self.apply(state, action), motion)
 
     def apply(self, state: int, action: int) -> int:
         """The state after the effects of `action`, no question asked."""
@@ -267,6 +271,17 @@ def _ask(predicate: Derived, world: object, view: BitState, args: tuple[str, ...
             "Write ns.Verdict(holds, because=(...), reason='...')."
         )
     return verdict
+
+
+def _as_motion(predicate: Derived, given: Any) -> StepMotion:
+    """What a predicate says of how parts move; a direction will do."""
+    try:
+        return given if isinstance(given, StepMotion) else StepMotion.along((), given)
+    except InputError:
+        raise ContractError(
+            f"Expected the derived predicate {predicate} to answer with a StepMotion as motion, or with a direction of "
+            f"three numbers; got {given!r}."
+        ) from None
 
 
 def _reachable(initial: set[Atom], instances: Sequence[_Instance]) -> list[_Instance]:

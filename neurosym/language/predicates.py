@@ -13,14 +13,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 from numpy.typing import ArrayLike
 
 from neurosym.errors import DefinitionError
 from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.blocking.sweep import exits_along
-from neurosym.geometry.step_motion import Way
+from neurosym.geometry.step_motion import StepMotion
 from neurosym.language import formulas
 from neurosym.language.search_problem import Verdict
 from neurosym.language.state import State
@@ -57,7 +56,8 @@ def free(
             else:
                 hit = sum(1 << o for o in exits_along(world, number, graph.directions[d], bits(there)))
             if not hit:
-                return Verdict(True, (), f"{p} is free along {graph.describe(d)}.", None, graph.vectors[d])
+                motion = StepMotion(direction=graph.vectors[d])
+                return Verdict(True, (), f"{p} is free along {graph.describe(d)}.", motion=motion)
             because |= hit
             # One blocker a direction keeps the promise; one that blocks several keeps it for all of them.
             if not witnesses & hit:
@@ -130,7 +130,7 @@ def stable_without(present: Fluent, *, removal: bool = True, held: int = 0) -> D
     Args:
         present: the fluent, of one part, that says which parts are there.
         removal: parts that left do not come back, so that a verdict may promise.
-        held: how many of the others may be held meanwhile; with any, `how` is a `Way` that says which, and nothing is
+        held: how many of the others may be held meanwhile; with any, the verdict's motion says which, and nothing is
             promised.
     """
     part = _part_type(present)
@@ -139,13 +139,13 @@ def stable_without(present: Fluent, *, removal: bool = True, held: int = 0) -> D
         rest = state.mask(present, world.names) & ~(1 << world.index[p])
         return stands(world, rest, (p,), present if removal and not held else None, held)
 
-    def check(world: Assembly, state: State, how: Any, p: str) -> Verdict:
-        hands = how.held if isinstance(how, Way) else ()
+    def check(world: Assembly, state: State, motion: StepMotion, p: str) -> Verdict:
+        hands = motion.held
         if len(hands) > held or p in hands:
             return Verdict(False, hands, f"Step {p}: expected at most {held} of the others to be held; got {hands}.")
         rest = state.mask(present, world.names) & ~(1 << world.index[p])
         if world.stability().standing(rest, held=world.mask(hands)).stands:
-            return Verdict(True, (), f"The others stand without {p}.", how=how)
+            return Verdict(True, (), f"The others stand without {p}.", motion=motion)
         return ask(world, state, p) if not hands else _falls(world, world.stability().standing(rest).moving, (p,), held)
 
     def formula(world: Assembly, p: str) -> formulas.Stands:
@@ -164,8 +164,8 @@ def stands(world: Assembly, rest: int, leaving: Sequence[str], present: Fluent |
     said = ", ".join(leaving)
     answer = world.stability().standing_when_held(rest, held) if held else world.stability().standing(rest)
     if answer.stands:
-        how = Way(held=world.in_mask(answer.held)) if answer.held else None
-        return Verdict(True, (), f"The others stand without {said}.", how=how)
+        motion = StepMotion(held=world.in_mask(answer.held)) if answer.held else None
+        return Verdict(True, (), f"The others stand without {said}.", motion=motion)
     verdict = _falls(world, answer.moving, leaving, held)
     # The motion stays possible while every part that moves in it is there, whatever else has left.
     until = None if present is None else tuple(Atom(present, (n,)) for n in verdict.because)

@@ -9,9 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
+from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
 
 if TYPE_CHECKING:
+    from neurosym.geometry.step_motion import StepMotion
     from neurosym.language.terms import Atom
 
 S = TypeVar("S", bound=Hashable)
@@ -30,7 +31,8 @@ class Verdict:
             that it never will. Planners learn from it, so it must be sound.
         unconditional: a stronger promise: the verdict does not depend on the rest of the state. It does not hold in
             any state in which the atoms of `until` are as they are now, whether or not it comes after this one.
-        how: for a verdict that holds, how the action may be done (a direction, a path), kept in the plan.
+        motion: for a verdict that holds, what it says of how the action may move parts, kept in the plan; a direction
+            will do. Which parts move, and whether in or out, follows from the action's effects unless it says so.
         proved: for a verdict that does not hold, whether that is certain. A search for a path that ended without one
             proves nothing: what rests on it is given up, never called impossible. It can promise nothing either.
     """
@@ -39,7 +41,7 @@ class Verdict:
     because: tuple[str, ...] = ()
     reason: str = ""
     until: tuple[Atom, ...] | None = None
-    how: Any = None
+    motion: StepMotion | None = None
     unconditional: bool = False
     proved: bool = True
 
@@ -49,10 +51,10 @@ class Verdict:
 
 @dataclass(frozen=True, slots=True)
 class Step(Generic[S]):
-    """An attempt that succeeded: the new state, and how it was done (direction, path, what was held)."""
+    """An attempt that succeeded: the new state, and how it moves parts, where it moves any."""
 
     state: S
-    how: Any = None
+    motion: StepMotion | None = None
 
 
 @dataclass(frozen=True, slots=True)

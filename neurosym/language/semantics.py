@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
+    from neurosym.geometry.step_motion import StepMotion
     from neurosym.language.explanation import WhyNot
     from neurosym.language.problem import Problem
     from neurosym.language.search_problem import SearchProblem
@@ -44,7 +45,7 @@ class Semantics:
         """What planners see: by default the ground symbols, which name the actions, precedence and goal in any case."""
         return problem.symbols
 
-    def replay(self, problem: Problem, order: Sequence[str], how: Sequence[Any]) -> Validation | None:
+    def replay(self, problem: Problem, order: Sequence[str], motions: Sequence[StepMotion | None]) -> Validation | None:
         """See `validate`: shares no table with `search` and asks the world anew. None: by the symbols."""
         return None
 
@@ -60,6 +61,6 @@ class Semantics:
         """Pictures of the finished work, uint8 (V, H, W, 3), the same each time; None: there are none."""
         return None
 
-    def staging(self, problem: Problem, plan: Sequence[str], how: Sequence[Any]) -> Staging | None:
+    def staging(self, problem: Problem, plan: Sequence[str], motions: Sequence[StepMotion | None]) -> Staging | None:
         """What a plan does to parts in space; None: it follows from the effects, or from `Problem.simulation`."""
         return None

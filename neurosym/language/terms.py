@@ -114,8 +114,8 @@ class Derived(_Predicate):
     Its function takes the world, the state and the names of the objects, and answers with a `Verdict`.
 
     Args:
-        check: for answers that are found by a search and say `how`: takes the world, the state, the `how` of a step and
-            the names of the objects, and answers whether it may be done so. Replays of a plan that says how ask it
+        check: for answers that are found by a search and say a motion: takes the world, the state, the motion of a step
+            and the names of the objects, and answers whether it may be done so. Replays of a plan with motions ask it
             instead of `function`: what was found once need not be found again, but must hold.
         formula: takes the world and the names of the objects, and says for all states at once when it holds (None: it
             cannot say). Whoever writes the problem down for other programs asks it.

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from neurosym.errors import InputError
 from neurosym.geometry.readers.reading import referenced
-from neurosym.geometry.step_motion import Way
+from neurosym.geometry.step_motion import StepMotion
 from neurosym.registry import load_domain
 
 if TYPE_CHECKING:
@@ -27,13 +27,13 @@ class SavedPlan:
     Attributes:
         problem: made again from what the file says of it.
         plan: names of the actions, in order.
-        how: one entry a step: how it is done, a `Way`, a direction, a path, or None.
+        motions: one a step; None where the file says none.
         document: the whole file.
     """
 
     problem: Problem
     plan: tuple[str, ...]
-    how: tuple[Any, ...]
+    motions: tuple[StepMotion | None, ...]
     document: Mapping[str, Any]
 
 
@@ -63,17 +63,9 @@ def read_plan(path: str | Path) -> SavedPlan:
             )
     if document["plan"] != [step["action"] for step in steps]:
         raise InputError(f'Expected the same actions, in the same order, in "plan" and "steps" of {path}; they differ.')
-    return SavedPlan(problem, tuple(s["action"] for s in steps), tuple(map(_how, steps)), document)
-
-
-def _how(step: Mapping[str, Any]) -> Any:
-    if "parts" in step:
-        return Way.from_json(step)
-    given = step.get("how")
-    # A direction, as the oracle gave it; a path of poses stays a list.
-    if isinstance(given, list) and len(given) == 3 and all(isinstance(v, int | float) for v in given):
-        return tuple(given)
-    return given
+    moves = [step.get("how") is not None or "parts" in step for step in steps]
+    motions = tuple(StepMotion.from_json(step) if move else None for step, move in zip(steps, moves))
+    return SavedPlan(problem, tuple(s["action"] for s in steps), motions, document)
 
 
 def problem_of(document: Mapping[str, Any], path: str | Path = "plan.json") -> Problem:

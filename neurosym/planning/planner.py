@@ -20,6 +20,7 @@ from neurosym.language.search_problem import Rejection, SearchProblem, Step
 from neurosym.planning.prior import OrderScores
 
 if TYPE_CHECKING:
+    from neurosym.geometry.step_motion import StepMotion
     from neurosym.language.explanation import WhyNot
 
 S = TypeVar("S", bound=Hashable)
@@ -105,30 +106,19 @@ class Plan(tuple[str, ...]):
     """Names of actions in order: a tuple that knows how each of them is done.
 
     Attributes:
-        how: one entry an action, or none at all.
+        motions: one an action (None: it moves nothing in space), or none at all.
     """
 
-    how: tuple[Any, ...]
+    motions: tuple[StepMotion | None, ...]
 
-    def __new__(cls, actions: Iterable[str], how: Iterable[Any] = ()) -> Plan:
+    def __new__(cls, actions: Iterable[str], motions: Iterable[StepMotion | None] = ()) -> Plan:
         made = super().__new__(cls, actions)
-        made.how = tuple(how)
+        made.motions = tuple(motions)
         return made
 
     def reversed(self) -> Plan:
-        """The plan backwards, for what was taken apart to be put together: last first, each motion inverted.
-
-        A `Way` inverts itself; a direction (three numbers) is negated; anything else is kept as it is.
-        """
-        return Plan(self[::-1], [_inverted(how) for how in self.how[::-1]])
-
-
-def _inverted(how: Any) -> Any:
-    if hasattr(how, "reversed"):
-        return how.reversed()
-    if isinstance(how, tuple) and len(how) == 3 and all(isinstance(v, float | int) for v in how):
-        return tuple(-v + 0.0 for v in how)
-    return how
+        """The plan backwards, for what was taken apart to be put together: last first, each motion reversed."""
+        return Plan(self[::-1], [motion and motion.reversed() for motion in self.motions[::-1]])
 
 
 @dataclass(frozen=True)
@@ -138,7 +128,7 @@ class PlanResult:
     Attributes:
         status: how it ended.
         plan: names of the actions in order, or None.
-        how: one entry a step of the plan: how the oracle says it may be done.
+        motions: one a step of the plan, as the oracle says it may be done, or none at all.
         iterations: refusals before the plan (for swap repair, the paper's count of failed rollouts).
         expansions: states whose candidates were generated.
         attempts: questions put to the oracle.
@@ -159,7 +149,7 @@ class PlanResult:
     seconds: float
     best_prefix: tuple[str, ...] = ()
     blame: tuple[Refusal, ...] = ()
-    how: tuple[Any, ...] = ()
+    motions: tuple[StepMotion | None, ...] = ()
     cost: float | None = None
     first_guess_failed: bool | None = None
     why_not: WhyNot | None = None
@@ -169,17 +159,17 @@ class PlanResult:
             raise ContractError(
                 f"Expected a plan exactly when the status is SOLVED; got {self.status.name} with plan {self.plan}."
             )
-        if self.plan is not None and len(self.how) not in (0, len(self.plan)):
-            raise ContractError(f"Expected one `how` a step, {len(self.plan)} in all; got {len(self.how)}.")
+        if self.plan is not None and len(self.motions) not in (0, len(self.plan)):
+            raise ContractError(f"Expected one motion a step, {len(self.plan)} in all; got {len(self.motions)}.")
         if self.plan is not None:
-            object.__setattr__(self, "plan", Plan(self.plan, self.how))
+            object.__setattr__(self, "plan", Plan(self.plan, self.motions))
 
     @property
     def solved(self) -> bool:
         return self.status is Status.SOLVED
 
     def reversed(self) -> Plan:
-        """The plan backwards, each motion inverted: how to put together what the plan takes apart.
+        """The plan backwards, each motion reversed: how to put together what the plan takes apart.
 
         Raises:
             InputError: there is no plan.
@@ -268,14 +258,14 @@ class SearchLog(Generic[S]):
     def solved(
         self,
         plan: Sequence[int],
-        how: Sequence[Any] = (),
+        motions: Sequence[StepMotion | None] = (),
         *,
         scores: OrderScores | None = None,
         first_guess_failed: bool | None = None,
     ) -> PlanResult:
         """The result for a plan, given as indices of actions."""
         cost = None if scores is None else scores.plan_cost(plan)
-        return self._result(Status.SOLVED, tuple(plan), tuple(how), cost, first_guess_failed)
+        return self._result(Status.SOLVED, tuple(plan), tuple(motions), cost, first_guess_failed)
 
     def failed(self, status: Status, *, first_guess_failed: bool | None = None) -> PlanResult:
         """The result for a search that ended without a plan.
@@ -290,7 +280,7 @@ class SearchLog(Generic[S]):
         self,
         status: Status,
         plan: tuple[int, ...] | None,
-        how: tuple[Any, ...],
+        motions: tuple[StepMotion | None, ...],
         cost: float | None,
         first_guess_failed: bool | None,
     ) -> PlanResult:
@@ -298,14 +288,14 @@ class SearchLog(Generic[S]):
         blame = tuple(Refusal(self.names(p), names[a], r.reason, r.because) for p, a, r in self._refusals)
         return PlanResult(
             status=status,
-            plan=None if plan is None else Plan(self.names(plan), how),
+            plan=None if plan is None else Plan(self.names(plan), motions),
             iterations=self.iterations,
             expansions=self.expansions,
             attempts=self.attempts,
             seconds=self.seconds,
             best_prefix=self.names(self.best_prefix if plan is None else plan),
             blame=blame,
-            how=how,
+            motions=motions,
             cost=cost,
             first_guess_failed=first_guess_failed,
         )

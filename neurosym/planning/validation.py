@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from neurosym.errors import InputError, UnknownNameError
+from neurosym.geometry.step_motion import StepMotion, check_motions
 from neurosym.language.search_problem import Rejection, SearchProblem
 from neurosym.language.semantics import Validation as Validation
 from neurosym.language.state import AtomSet
@@ -15,23 +16,21 @@ if TYPE_CHECKING:
     from neurosym.language.problem import Problem
 
 
-def validate(problem: Problem, order: Sequence[str], how: Sequence[Any] = ()) -> Validation:
+def validate(problem: Problem, order: Sequence[str], motions: Sequence[StepMotion | None] = ()) -> Validation:
     """Replay an order, given as names of action primitives (for Soma the pieces' letters).
 
     Args:
-        how: one entry a step, as `PlanResult.how` has them: then each step must be possible in this way. Empty: in
-            any way.
+        motions: one a step, as `PlanResult.motions` has them: then each step must be possible so. Empty: in any way.
 
     Raises:
         UnknownNameError: a name that is no action of the problem's domain.
-        InputError: not one `how` a step.
+        InputError: not one motion a step.
     """
     if not hasattr(problem, "domain"):
         raise InputError(f"Expected a Problem, as Domain.problem makes it; got {problem!r}.")
     if not isinstance(order, Sequence):
         raise InputError(f"Expected an order as a list of names of action primitives; got {order!r}.")
-    if len(how) not in (0, len(order)):
-        raise InputError(f"Expected one `how` a step, {len(order)} in all, or none; got {len(how)}.")
+    check_motions(motions, len(order))
     ground = {}
     for action in problem.domain.actions:
         for binding in problem.bindings(action):
@@ -39,7 +38,7 @@ def validate(problem: Problem, order: Sequence[str], how: Sequence[Any] = ()) ->
     for name in order:
         if not isinstance(name, str) or name not in ground:
             raise UnknownNameError("action primitive", name, ground)
-    replayed = problem.semantics.replay(problem, order, how)
+    replayed = problem.semantics.replay(problem, order, motions)
     if replayed is not None:
         return replayed
     world = problem.world.afresh() if hasattr(problem.world, "afresh") else problem.world
@@ -47,12 +46,12 @@ def validate(problem: Problem, order: Sequence[str], how: Sequence[Any] = ()) ->
     done: list[str] = []
     possible = set(problem.actions)
 
-    def failure(literals: Sequence[Literal], way: Any = None) -> tuple[tuple[str, ...], str] | None:
+    def failure(literals: Sequence[Literal], motion: StepMotion | None = None) -> tuple[tuple[str, ...], str] | None:
         for literal in sorted(literals, key=lambda x: isinstance(x.atom.predicate, Derived)):
             predicate = literal.atom.predicate
             if isinstance(predicate, Derived):
-                if way is not None and predicate.check is not None:
-                    verdict = predicate.check(world, state, way, *literal.atom.args)
+                if motion is not None and predicate.check is not None:
+                    verdict = predicate.check(world, state, motion, *literal.atom.args)
                 else:
                     verdict = predicate.function(world, state, *literal.atom.args)
                 if verdict.holds is not literal.positive:
@@ -72,7 +71,7 @@ def validate(problem: Problem, order: Sequence[str], how: Sequence[Any] = ()) ->
             if then == name and first in possible and first not in done:
                 return Validation(False, step, (first,), f"{name} may be done only after {first}.")
         action, binding = ground[name]
-        wrong = failure([p.bind(binding) for p in action.pre], how[step] if how else None)
+        wrong = failure([p.bind(binding) for p in action.pre], motions[step] if motions else None)
         if wrong is not None:
             return Validation(False, step, wrong[0], f"Step {step}, {name}: {wrong[1]}")
         effects = [e.bind(binding) for e in action.eff]

@@ -75,18 +75,17 @@ def frames(
         report(ends)
         for i, motion in enumerate(staging.motions):
             around, words, note = company(staging, i), describe(staging, i), f"{i + 1}/{count}"
-            colour = colours[first_part(motion)]
+            colour = colours[first_part(staging, i)]
             for k in range(1, moving + 1):
-                shot = film.picture({*around, *motion.parts}, motion.where(_eased(k / moving)), marked=motion.held)
+                shot = film.picture({*around, *motion.parts}, motion.at(_eased(k / moving)), marked=motion.held)
                 yield captioned(shot, words, note=note, colour=colour, progress=(i + k / moving) / count)
                 report(1)
             after = set(around) | set(motion.parts) if motion.arrives else set(around) - set(motion.parts)
-            back = {name for names, _, _ in motion.aside for name in names} - set(motion.parts)
             for k in range(1, held + 1):
-                if k == 1 or back:
+                if k == 1 or motion.making_way:
                     # What made way for a part that leaves goes back the way it came; for one that arrives it is back.
-                    where = {} if motion.arrives else motion.where(1 - _eased(k / held))
-                    shot = film.picture(after, {name: X for name, X in where.items() if name in back})
+                    where = {} if motion.arrives else motion.out(1 - _eased(k / held))
+                    shot = film.picture(after, {name: X for name, X in where.items() if name in motion.making_way})
                     shot = captioned(shot, words, note=note, colour=colour, progress=(i + 1) / count)
                 yield shot
                 report(1)

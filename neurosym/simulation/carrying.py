@@ -8,7 +8,7 @@ from math import ceil
 import numpy as np
 from numpy.typing import NDArray
 
-from neurosym.planning.staging import Motion
+from neurosym.geometry.step_motion import StepMotion
 from neurosym.simulation.physics import BodyKey
 from neurosym.simulation.solids import matrix, quaternion
 from neurosym.simulation.world import World
@@ -34,12 +34,11 @@ class Carrier:
         motion: the step; of its parts and those that make way, all that are there move.
     """
 
-    def __init__(self, world: World, motion: Motion) -> None:
+    def __init__(self, world: World, motion: StepMotion) -> None:
         self.world, self.motion = world, motion
         self._p, self._c = world.client.p, world.client.id
-        names = dict.fromkeys([*motion.parts, *(name for group in motion.aside for name in group[0])])
         self._numbers: dict[BodyKey, int] = {}
-        for name in names:
+        for name in motion.parts + motion.making_way:
             self._numbers |= world.numbers(name)
         self._start = {
             key: matrix(*self._p.getBasePositionAndOrientation(number, physicsClientId=self._c))
@@ -51,7 +50,7 @@ class Carrier:
 
         Looked for at places half the thinnest body apart, so that nothing is jumped over.
         """
-        reach = max(self.motion.length, self._turning())
+        reach = max(self.motion.tracks[0].length, self._turning())
         count = max(1, ceil(reach / (self.world.assembly.smallest_extent / 2)))
         hit: set[str] = set()
         for i in range(1, count + 1):
@@ -84,7 +83,8 @@ class Carrier:
         p, c, world = self._p, self._c, self.world
         inward = self.motion.arrives
         self.put(float(inward))
-        steps = ceil(max(self.motion.length, self._turning()) * world.scale / PULL_SPEED / world.physics.time_step)
+        far = max(self.motion.tracks[0].length, self._turning()) * world.scale
+        steps = ceil(far / PULL_SPEED / world.physics.time_step)
         aims = self._frames(float(inward))
         with Grip(world, self._numbers) as grip:
             for i in range(1, steps + 1):
@@ -98,7 +98,7 @@ class Carrier:
         return max(float(np.linalg.norm(np.subtract(ends[k], aims[k][0]))) for k in ends) / world.scale
 
     def _frames(self, out: float) -> dict[BodyKey, Frame]:
-        where = self.motion.where(1 - out if self.motion.arrives else out)
+        where = self.motion.out(out)
         found = {}
         for key, X in self._start.items():
             motion = where[key[0]].copy()
@@ -109,7 +109,7 @@ class Carrier:
 
     def _turning(self) -> float:
         """How far a corner of what moves goes by turning alone, about."""
-        R = self.motion.path[:, :3, :3]
+        R = self.motion.tracks[0].poses[:, :3, :3]
         angles = np.arccos(np.clip((np.einsum("kij,kij->k", R[1:], R[:-1]) - 1) / 2, -1, 1))
         return float(angles.sum()) * self.world.assembly.smallest_extent * 2
 

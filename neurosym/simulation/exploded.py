@@ -122,7 +122,8 @@ def _directions(staging: Staging) -> dict[str, Array]:
     """Part -> unit vector of its way out, where that is straight, or at least ends somewhere else."""
     found: dict[str, Array] = {}
     for motion in staging.motions:
-        way = motion.path[-1][:3, :3] @ motion.centre + motion.path[-1][:3, 3] - motion.centre
+        end, centre = motion.tracks[0].poses[-1], motion.tracks[0].centre
+        way = end[:3, :3] @ centre + end[:3, 3] - centre
         length = float(np.linalg.norm(way))
         if length > 0:
             found |= dict.fromkeys(motion.parts, way / length)

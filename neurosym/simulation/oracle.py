@@ -15,6 +15,7 @@ import numpy as np
 
 from neurosym.errors import InputError
 from neurosym.geometry.assembly import Assembly
+from neurosym.geometry.step_motion import StepMotion
 from neurosym.language.search_problem import Rejection, Step
 from neurosym.simulation.client import Closeable
 from neurosym.simulation.physics import MOVED_SHARE, SETTLE_STEPS, Physics, Snapshot
@@ -61,9 +62,9 @@ class RemovalProblem(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class _Accepted:
-    """A removal that the rest bore: along which direction, and where everything then lay (for rigid parts)."""
+    """A removal that the rest bore: its motion, and where everything then lay (for rigid parts)."""
 
-    how: tuple[float, ...] | None = None
+    motion: StepMotion | None = None
     poses: Snapshot = field(default_factory=Snapshot)
 
 
@@ -153,7 +154,7 @@ class PhysicsOracle(Closeable):
     def attempt(self, state: PhysicsState, action: int) -> Step[PhysicsState] | Rejection:
         """Simulate taking the part of `action` away, after the removals that `state` remembers.
 
-        An accepted step says in ``how`` along which direction the part leaves (rule ``"rigid"``).
+        The motion of an accepted step says along which direction the part leaves (rule ``"rigid"``).
 
         Raises:
             InputError: `state` holds a history that was itself refused, so that nothing can follow it.
@@ -162,7 +163,7 @@ class PhysicsOracle(Closeable):
         answer = self._answer((*history, action))
         if isinstance(answer, Rejection):
             return answer
-        return Step((self._base.apply(symbols, action), (*history, action)), answer.how)
+        return Step((self._base.apply(symbols, action), (*history, action)), answer.motion)
 
     # -- simulation -------------------------------------------------------------------------------------------
 
@@ -241,7 +242,7 @@ class PhysicsOracle(Closeable):
         if moved:
             said = joined(tuple(f"{name} by {distance:.2g}" for name, distance in moved.items()))
             return Rejection(f"Parts moved: {said}.", tuple(moved))
-        return _Accepted(tuple(float(x) for x in direction), world.poses())
+        return _Accepted(StepMotion.along((part,), direction), world.poses())
 
     def _in_the_way(self, part: str, direction: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> tuple[str, ...]:
         """The first parts that `part` runs into when it moves along `direction` until it is past everything."""

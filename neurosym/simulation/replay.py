@@ -17,11 +17,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import ExitStack
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-import numpy as np
-
-from neurosym.planning.staging import Motion, Staging, stage
+from neurosym.geometry.step_motion import StepMotion
+from neurosym.planning.staging import Staging, stage
 from neurosym.simulation.carrying import Carrier, hold
 from neurosym.simulation.oracle import COLLAPSE_CUBES, CUBES_CLEARANCE
 from neurosym.simulation.physics import MOVED_SHARE, SETTLE_STEPS, Physics, Snapshot
@@ -40,7 +39,7 @@ JAMMED_SHARE = 0.5
 def replay_plan(
     problem: Problem,
     plan: Sequence[str],
-    how: Sequence[Any] = (),
+    motions: Sequence[StepMotion | None] = (),
     *,
     pulled: bool = False,
     bodies: str | None = None,
@@ -54,7 +53,7 @@ def replay_plan(
     Args:
         problem: what was planned.
         plan: names of actions, in order.
-        how: one entry a step, as `PlanResult.how` has them, or nothing; then a free straight way is looked for.
+        motions: one a step, as `PlanResult.motions` has them, or none; then a free straight line is looked for.
         pulled: whether parts are pulled along their path by a grip, against friction, instead of by hand.
         bodies: ``"rigid"``: every part is one body; ``"cubes"``: every body of a part is independent, a part is
             deleted rather than moved, and one body may fall alone (the paper's rule); None: as the problem's
@@ -68,7 +67,7 @@ def replay_plan(
     A problem that was planned without gravity is replayed without.
 
     Raises:
-        InputError: a plan, a `how` or an assembly that cannot be simulated.
+        InputError: a plan, a motion or an assembly that cannot be simulated.
         NeurosymError: no screen for the window, or no OpenGL.
     """
     rule = bodies or (problem.simulation.bodies if problem.simulation is not None else "rigid")
@@ -78,7 +77,7 @@ def replay_plan(
         clearance=CUBES_CLEARANCE if rule == "cubes" else 0.0,
     )
     return replay_staging(
-        stage(problem, plan, how),
+        stage(problem, plan, motions),
         pulled=pulled,
         bodies=rule,
         physics=physics,
@@ -119,10 +118,10 @@ def replay_staging(
         run = _Run(world, staging, bodies == "cubes", pulled, threshold, shown)
         start = run.start()
         steps: list[StepReplay] = []
-        for motion in staging.motions:
+        for step in range(len(staging.motions)):
             if stop_at_failure and not (steps[-1] if steps else start).stood_still:
                 break
-            steps.append(run.step(motion))
+            steps.append(run.step(step))
         return ReplayReport(
             start,
             tuple(steps),
@@ -151,37 +150,33 @@ class _Run:
         self.world, self.cubes, self.pulled, self.window = world, cubes, pulled and not cubes, window
         self.threshold = MOVED_SHARE * world.unit if threshold is None else threshold
         self.smallest = smallest_part(staging.assembly)
-        self._motions = staging.motions
+        self._staging = staging
 
     def start(self) -> StepReplay:
         """Let everything settle before the first step."""
         before = self.world.poses()
         self.world.settle(watch=self._show)
-        return self._judged(Motion("(start)", (), np.tile(np.eye(4), (2, 1, 1))), before, ())
+        return self._judged("(start)", StepMotion(), before, ())
 
-    def step(self, motion: Motion) -> StepReplay:
+    def step(self, number: int) -> StepReplay:
         """Do one step, and let the rest settle."""
-        world = self.world
+        world, action, motion = self.world, self._staging.plan[number], self._staging.motions[number]
         there = {part for part, _ in world.bodies}
         if motion.arrives:
-            if self._comes_again(motion):
-                return in_hand(motion, "will arrive later, with others: put together in the hand.")
+            later = self._staging.motions[number + 1 :]
+            if any(other.arrives and set(motion.parts) & set(other.parts) for other in later):
+                return in_hand(action, motion, "will arrive later, with others: put together in the hand.")
             world.add(*(name for name in motion.parts if name not in there))
         elif not there & set(motion.parts):
             # A sub-assembly that left as a whole is taken apart where nothing rests on it.
-            return in_hand(motion, "left before, with others: taken from them in the hand.")
+            return in_hand(action, motion, "left before, with others: taken from them in the hand.")
         before = world.poses()
         with ExitStack() as stack:
             if motion.held:
                 stack.enter_context(hold(world, motion.held))
             carrier = Carrier(world, motion)
             blocked = self._pull(carrier) if self.pulled else self._by_hand(carrier)
-        return self._judged(motion, before, blocked)
-
-    def _comes_again(self, motion: Motion) -> bool:
-        """Whether a later step brings what this one brings once more, as part of a group."""
-        later = self._motions[next(i for i, other in enumerate(self._motions) if other is motion) + 1 :]
-        return any(other.arrives and set(motion.parts) & set(other.parts) for other in later)
+        return self._judged(action, motion, before, blocked)
 
     def _pull(self, carrier: Carrier) -> tuple[str, ...]:
         motion = carrier.motion
@@ -214,7 +209,9 @@ class _Run:
         if self.window is not None:
             self.window.tick()
 
-    def _judged(self, motion: Motion, before: Snapshot, blocked: tuple[str, ...]) -> StepReplay:
+    def _judged(
+        self, action: str, motion: StepMotion, before: Snapshot, blocked: tuple[str, ...]
+    ) -> StepReplay:
         """What moved since `before`; what has arrived is to stand too."""
         moved_bodies: dict[str, list[float]] = {}
         for (part, _), far in self.world.displacement(before).items():
@@ -229,7 +226,7 @@ class _Run:
         if moved and stood:
             reason += " One cube alone may fall, by this rule."
         return StepReplay(
-            motion.action,
+            action,
             motion.parts,
             motion.arrives,
             distance,

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from neurosym.planning.staging import Motion
+from neurosym.geometry.step_motion import StepMotion
 from neurosym.support.words import joined
 
 
@@ -112,7 +112,7 @@ def _step_json(step: StepReplay) -> dict[str, Any]:
 
 
 def reason_of(
-    motion: Motion,
+    motion: StepMotion,
     moved: Mapping[str, float],
     blocked: tuple[str, ...],
     distance: float,
@@ -133,9 +133,9 @@ def reason_of(
     return " ".join(said)
 
 
-def in_hand(motion: Motion, what: str) -> StepReplay:
+def in_hand(action: str, motion: StepMotion, what: str) -> StepReplay:
     """A step that is done where nothing else can fall."""
     said = f"{joined(motion.parts)} {what}"
     return StepReplay(
-        motion.action, motion.parts, motion.arrives, 0.0, 0.0, None, {}, (), True, said, motion.held, in_hand=True
+        action, motion.parts, motion.arrives, 0.0, 0.0, None, {}, (), True, said, motion.held, in_hand=True
     )

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from neurosym.planning.staging import Motion, Staging
+from neurosym.planning.staging import Staging
 from neurosym.simulation.filming import DEFAULT_CAMERA, TOPS_CAMERA
 from neurosym.simulation.looks import Camera
+from neurosym.support.words import in_words
 
 Array = NDArray[np.float64]
 
@@ -43,28 +44,23 @@ def company(staging: Staging, step: int) -> tuple[str, ...]:
     return tuple(name for name in staging.assembly.names if name in group - coming)
 
 
-def first_part(motion: Motion) -> str:
+def first_part(staging: Staging, step: int) -> str:
     """The part that a step is about: the one that its action is named after, or the first that moves."""
-    return motion.action if motion.action in motion.parts else motion.parts[0]
+    action, parts = staging.plan[step], staging.motions[step].parts
+    return action if action in parts else parts[0]
 
 
 def describe(staging: Staging, step: int) -> str:
     """'remove L, along +z'; 'remove a with b, along +x'; 'take a off b, along -z'."""
-    from neurosym.geometry.blocking.directions import in_words
-
-    motion = staging.motions[step]
-    around, part = set(company(staging, step)), first_part(motion)
+    action, motion = staging.plan[step], staging.motions[step]
+    around, part = set(company(staging, step)), first_part(staging, step)
     verb = "place" if motion.arrives else "remove"
     others = [name for name in motion.parts if name != part]
-    name = part if motion.action in motion.parts else f"{motion.action}: {part}"
+    name = part if action in motion.parts else f"{action}: {part}"
     said = f"{verb} {name}{' with ' + _few(others) if others else ''}"
     if not motion.arrives and not around >= set(staging.there(step)):
         said = f"take {name} off {_few(sorted(around - {part}))}"
-    if len(motion.path) > 2:
-        way = "along a path"
-    else:
-        shift = motion.path[1, :3, 3] * (-1 if motion.arrives else 1)
-        way = f"along {in_words((shift / np.linalg.norm(shift)).tolist())}" if shift.any() else "turning"
+    way = f"along {in_words(motion.direction)}" if motion.direction else "along a path"
     held = f", {_few(motion.held)} held" if motion.held else ""
     return f"{said}, {way}{held}"
 
@@ -95,6 +91,6 @@ def room_for(staging: Staging) -> Array:
         corners[name] = np.array(np.meshgrid(*zip(low, high))).reshape(3, -1).T
         found.append(corners[name])
     for motion in staging.motions:
-        for share in np.linspace(0, 1, 2 * len(motion.path) + 1):
-            found += [corners[name] @ X[:3, :3].T + X[:3, 3] for name, X in motion.where(float(share)).items()]
+        for share in np.linspace(0, 1, 2 * len(motion.tracks[0].poses) + 1):
+            found += [corners[name] @ X[:3, :3].T + X[:3, 3] for name, X in motion.at(float(share)).items()]
     return np.concatenate(found)

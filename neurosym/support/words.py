@@ -1,4 +1,4 @@
-"""Lists of names in a sentence."""
+"""Lists of names, and directions, in a sentence."""
 
 from __future__ import annotations
 
@@ -18,3 +18,11 @@ def listed(names: Sequence[str]) -> str:
     if len(names) > LISTED:
         return f"{', '.join(names[: LISTED - 1])} and {len(names) - LISTED + 1} more"
     return joined(names)
+
+
+def in_words(direction: Sequence[float]) -> str:
+    """A direction of three numbers: ``+z`` along an axis of the world, its three numbers otherwise."""
+    for axis, name in enumerate("xyz"):
+        if abs(abs(direction[axis]) - 1) < 1e-9:
+            return ("+" if direction[axis] > 0 else "-") + name
+    return "(" + ", ".join(f"{float(v) + 0.0:.3g}" for v in direction) + ")"

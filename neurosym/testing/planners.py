@@ -129,10 +129,10 @@ def _check_answer(planner: Planner, toy: Toy, result: PlanResult, where: str) ->
 
 
 def _replay(problem: SearchProblem[Any], names: tuple[str, ...], where: str) -> tuple[list[Any], list[Any]]:
-    """The states and hows of an order given by names; each action a candidate, allowed, and used once."""
+    """The states and motions of an order given by names; each action a candidate, allowed, and used once."""
     index = {name: i for i, name in enumerate(problem.actions)}
     _require(len(set(names)) == len(names), where, "each action at most once", names)
-    states, hows = [problem.initial], []
+    states, motions = [problem.initial], []
     for name in names:
         _require(name in index, where, f"actions of the problem ({', '.join(index)})", name)
         _require(index[name] in problem.candidates(states[-1]), where, f"{name} to be a candidate in its turn", names)
@@ -140,17 +140,17 @@ def _replay(problem: SearchProblem[Any], names: tuple[str, ...], where: str) -> 
         if not isinstance(answer, Step):
             raise ContractError(f"{where}: expected {names} to replay; got a refusal of {name}: {answer.reason}")
         states.append(answer.state)
-        hows.append(answer.how)
-    return states, hows
+        motions.append(answer.motion)
+    return states, motions
 
 
 def _check_plan(toy: Toy, scores: OrderScores | None, result: PlanResult, where: str) -> None:
     assert result.plan is not None
-    states, hows = _replay(toy.problem, result.plan, where)
+    states, motions = _replay(toy.problem, result.plan, where)
     reached = [toy.problem.is_goal(state) for state in states]
     _require(reached[-1], where, "a plan that reaches the goal", result.plan)
     _require(not any(reached[:-1]), where, "a plan that ends where the goal is first reached", result.plan)
-    _require(result.how == () or list(result.how) == hows, where, f"how = {hows}", result.how)
+    _require(result.motions == () or list(result.motions) == motions, where, f"motions = {motions}", result.motions)
     if scores is None:
         _require(result.cost is None, where, "no cost without scores", result.cost)
     else:

@@ -11,10 +11,14 @@ from typing import Any
 
 import numpy as np
 
+from neurosym.geometry.step_motion import StepMotion
 from neurosym.language.search_problem import Rejection, SearchProblem, Step
 from neurosym.testing.wrapped import Counting as Counting
 from neurosym.testing.wrapped import Relabelled as Relabelled
 from neurosym.testing.wrapped import Unproved as Unproved
+
+#: Directions in which parts leave.
+AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
 
 
 @dataclass(frozen=True)
@@ -47,7 +51,7 @@ class NumberLine:
         there = state + self.sizes[action]
         if not 0 <= there <= self.limit:
             return Rejection(f"{there} is off the line.")
-        return Step(there, how=there)
+        return Step(there, StepMotion((f"to {there}",)))
 
 
 @dataclass(frozen=True)
@@ -55,7 +59,7 @@ class Removal:
     """Take parts away, one an action; states are bitsets of the parts that are gone.
 
     Attributes:
-        blockers: a part leaves by any of its directions; each is a bitset of parts that stand in its way.
+        blockers: a part leaves by any of its one or two directions; each is a bitset of parts that stand in its way.
         spoilers: a part can never leave once one of these is gone. This is what makes dead ends.
         needs: parts that must be gone before a part becomes a candidate at all.
         target: the parts that must go.
@@ -117,7 +121,7 @@ class Removal:
             return Rejection("Its support is gone for good.", until=(action,) if self.promises else ())
         present = [way & ~state for way in self.blockers[action]]
         if not all(present):
-            return Step(state | 1 << action, how=present.index(0))
+            return Step(state | 1 << action, StepMotion((self.actions[action],), AXES[present.index(0)]))
         # One blocker a direction: while they all stay, so does the part.
         first = dict.fromkeys((way & -way).bit_length() - 1 for way in present)
         names = tuple(self.actions[p] for p in first)

@@ -240,8 +240,8 @@ class Page:
                 self._play(False)
                 assign(self.slider, float(depth))
             colours: dict[str, tuple[int, int, int] | None] = dict.fromkeys(refusal.because, BECAUSE)
-            tried = {m.action: m.parts for m in timeline.staging.motions}.get(refusal.action, (refusal.action,))
-            self.scene.stand_out(colours | dict.fromkeys(tried, TRIED))
+            moved = {a: m.parts for a, m in zip(timeline.staging.plan, timeline.staging.motions)}
+            self.scene.stand_out(colours | dict.fromkeys(moved.get(refusal.action, (refusal.action,)), TRIED))
 
     def _tell_facts(self) -> None:
         timeline = self.shown.timeline if self.shown else None

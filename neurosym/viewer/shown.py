@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from neurosym.errors import InputError, NeurosymError
+from neurosym.geometry.step_motion import StepMotion
 from neurosym.language.problem import Problem
 from neurosym.language.search_problem import Step
 from neurosym.pipeline import advice
@@ -60,7 +61,7 @@ class Search:
 
     Attributes:
         steps: names of the actions that are played: the plan, or the longest prefix that works.
-        how: one entry a step, as `PlanResult.how` has them, or nothing.
+        motions: one a step, as `PlanResult.motions` has them, or nothing.
         status: how it ended.
         sentence: that in words.
         refusals: refused attempts in order.
@@ -71,7 +72,7 @@ class Search:
     """
 
     steps: tuple[str, ...]
-    how: tuple[Any, ...]
+    motions: tuple[StepMotion | None, ...]
     status: Status
     sentence: str
     refusals: tuple[Refusal, ...]
@@ -93,11 +94,11 @@ class Search:
             counts["cost (nats)"] = result.cost
         said = "Stopped; the longest prefix that works is kept." if stopped and not result.solved else None
         steps = result.best_prefix if result.plan is None else result.plan
-        how = () if result.plan is None else result.how
+        motions = () if result.plan is None else result.motions
         settings = _settings(query.planner, query.prior, query.oracle)
         sentence = said or result.status.sentence
         why_not = () if result.why_not is None else tuple(result.why_not.sentences)
-        return cls(steps, how, result.status, sentence, result.blame, counts, settings, scores, why_not)
+        return cls(steps, motions, result.status, sentence, result.blame, counts, settings, scores, why_not)
 
     @classmethod
     def saved(cls, saved: SavedPlan, scores: OrderScores | None) -> Search:
@@ -118,7 +119,7 @@ class Search:
         except (AttributeError, KeyError, TypeError) as error:
             raise InputError(f"Expected a plan's file as `neurosym plan --out` writes it; got {error!r}.") from None
         settings = _settings(*(document.get(key) for key in ("planner", "prior", "oracle")))
-        return cls(saved.plan, saved.how, status, status.sentence, refusals, counts, settings, scores, why_not)
+        return cls(saved.plan, saved.motions, status, status.sentence, refusals, counts, settings, scores, why_not)
 
 
 _COUNTS = ("iterations", "attempts", "expansions", "seconds")
@@ -151,8 +152,7 @@ class Shown:
         """Stage the film and take the pictures, as far as the problem has them."""
         timeline, pictures = None, None
         try:
-            how = search.how or _ways(problem, search)
-            timeline = Timeline(stage(problem, search.steps, how))
+            timeline = Timeline(stage(problem, search.steps, search.motions or _motions(problem, search)))
         except REFUSED as error:
             notes = (*notes, f"There is nothing to show in space: {error}")
         try:
@@ -179,21 +179,21 @@ def _checked(saved: SavedPlan, search: Search) -> Search:
     """
     if not search.solved or saved.document.get("oracle", "geometry") != "geometry":
         return search
-    checked = validate(saved.problem, saved.plan, saved.how)
+    checked = validate(saved.problem, saved.plan, saved.motions)
     if checked.ok:
         return search
     sentence = f"The file has a plan, but it does not hold. {checked.reason}"
     return replace(search, status=Status.GAVE_UP, sentence=sentence)
 
 
-def _ways(problem: Problem, search: Search) -> tuple[Any, ...]:
-    """How the steps of a prefix are done, which a search without a plan does not say: each is asked for once more.
+def _motions(problem: Problem, search: Search) -> tuple[StepMotion | None, ...]:
+    """The motions of a prefix, which a search without a plan does not say: each step is asked for once more.
 
     Nothing where one is refused: another oracle than geometry may have allowed it.
     """
     if search.solved:
         return ()
-    grounded, found = problem.ground(), []
+    grounded, motions = problem.ground(), []
     state = grounded.initial
     for name in search.steps:
         if name not in grounded.actions:
@@ -202,5 +202,5 @@ def _ways(problem: Problem, search: Search) -> tuple[Any, ...]:
         if not isinstance(step, Step):
             return ()
         state = step.state
-        found.append(step.how)
-    return tuple(found)
+        motions.append(step.motion)
+    return tuple(motions)

@@ -6,13 +6,11 @@ from collections.abc import Sequence
 from html import escape
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from neurosym.geometry.blocking.directions import in_words
+from neurosym.support.words import in_words
 from neurosym.viewer.panels import some
 
 if TYPE_CHECKING:
-    from neurosym.planning.staging import Motion
+    from neurosym.geometry.step_motion import StepMotion
     from neurosym.viewer.shown import Shown
 
 #: While a step of a longer list is under way, so many before it and after it are listed, to keep it in sight.
@@ -32,8 +30,8 @@ def caption(shown: Shown, t: float) -> str:
     if timeline is None or not total:
         text = name if shown.search.solved else f"{name}: no plan. The tab Plan says why, as far as it is known."
     elif now is not None:
-        motion = timeline.staging.motions[now]
-        said = f"{_who(motion)} {_verb(motion)} {escape(_way(motion))}"
+        action, motion = timeline.staging.plan[now], timeline.staging.motions[now]
+        said = f"{_who(action, motion)} {_verb(motion)} {escape(_way(motion))}"
         text = f"Step {now + 1} of {total}: {said}{_meanwhile(motion)}"
     elif t <= 0:
         text = f"{name}: before the first of {total} steps"
@@ -50,21 +48,22 @@ def steps(shown: Shown, now: int | None, *, all_of_them: bool = False) -> str:
         now: the step under way, or None.
         all_of_them: whether even a long list is whole while a step of it is under way.
     """
-    motions = shown.timeline.staging.motions if shown.timeline else ()
+    staging = shown.timeline.staging if shown.timeline else None
     total = len(shown.search.steps)
     first, end = (0, total) if now is None or all_of_them else _in_sight(now, total)
-    looked_for = [i for i, motion in enumerate(motions) if not motion.given]
-    mixed = 0 < len(looked_for) < len(motions)
+    guessed = staging.guessed if staging else frozenset()
+    mixed = 0 < len(guessed) < total
     rows = []
     for i in range(first, end):
-        how = f" <span class='quiet'>{escape(in_short(motions[i]))}</span>" if motions else ""
-        star = " *" if mixed and not motions[i].given else ""
+        action = shown.search.steps[i]
+        motion = f" <span class='quiet'>{escape(in_short(action, staging.motions[i]))}</span>" if staging else ""
+        star = " *" if mixed and i in guessed else ""
         style = " class='now' aria-current='step'" if i == now else ""
-        rows.append(f"<li{style} data-step='{i}'>{escape(shown.search.steps[i])}{how}{star}</li>")
+        rows.append(f"<li{style} data-step='{i}'>{escape(action)}{motion}{star}</li>")
     if not total:
         return _none(shown) or "<p>There is nothing to do.</p>"
     note = ""
-    if looked_for:
+    if guessed:
         which = "a step marked * moves" if mixed else "parts move"
         note = f"<p class='quiet'>The plan does not say how {which}: a free straight way was looked for here.</p>"
     above = f"<p class='quiet'>… {first} before</p>" if first else ""
@@ -72,9 +71,9 @@ def steps(shown: Shown, now: int | None, *, all_of_them: bool = False) -> str:
     return f"{_none(shown)}{note}{above}<ol start='{first + 1}'>{''.join(rows)}</ol>{below}"
 
 
-def in_short(motion: Motion) -> str:
+def in_short(action: str, motion: StepMotion) -> str:
     """How the parts of a step move, in a few words."""
-    others = [n for n in motion.parts if n != motion.action] if motion.action in motion.parts else []
+    others = [n for n in motion.parts if n != action] if action in motion.parts else []
     if not others and len(motion.parts) > 1:
         others = list(motion.parts)
     together = f", together with {some(others)}" if others else ""
@@ -104,40 +103,37 @@ def _in_sight(now: int, total: int) -> tuple[int, int]:
     return first, first + BEFORE + AFTER + 1
 
 
-def _who(motion: Motion) -> str:
+def _who(action: str, motion: StepMotion) -> str:
     """The step's name; of parts that go together, all of them."""
-    name = f"<b>{escape(motion.action)}</b>"
+    name = f"<b>{escape(action)}</b>"
     if len(motion.parts) == 1:
         return name
     parts = f"<b>{escape(some(motion.parts))}</b>"
-    return f"{parts} together" if motion.action in motion.parts else f"{name}: {parts} together"
+    return f"{parts} together" if action in motion.parts else f"{name}: {parts} together"
 
 
-def _verb(motion: Motion) -> str:
+def _verb(motion: StepMotion) -> str:
     one = len(motion.parts) == 1
     if motion.arrives:
         return "comes" if one else "come"
     return "leaves" if one else "leave"
 
 
-def _way(motion: Motion) -> str:
-    if len(motion.path) > 2:
-        return f"along a path of {len(motion.path)} poses"
-    shift = motion.path[-1, :3, 3] - motion.path[0, :3, 3]
-    shift = -shift if motion.arrives else shift
-    return f"along {in_words((shift / max(float(np.linalg.norm(shift)), 1e-300)).tolist())}"
+def _way(motion: StepMotion) -> str:
+    if motion.direction:
+        return f"along {in_words(motion.direction)}"
+    return f"along a path of {len(motion.tracks[0].poses)} poses"
 
 
-def _meanwhile(motion: Motion) -> str:
+def _meanwhile(motion: StepMotion) -> str:
     """What else happens in a step, as HTML: what makes way, and what is held, in the colour of its outline."""
     names = f"<span style='{_HELD}'>{escape(some(motion.held))}</span>"
     held = f", while {names} {_is(motion.held)} held" if motion.held else ""
     return f"{escape(_making_way(motion))}{held}"
 
 
-def _making_way(motion: Motion) -> str:
-    names = [n for group, *_ in motion.aside for n in group if n not in motion.parts]
-    return f", {some(names)} making way" if names else ""
+def _making_way(motion: StepMotion) -> str:
+    return f", {some(motion.making_way)} making way" if motion.making_way else ""
 
 
 def _is(names: Sequence[str]) -> str:

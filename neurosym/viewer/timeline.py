@@ -8,7 +8,6 @@ it there. A plan that puts together is the film of its reverse, run backwards.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -18,7 +17,8 @@ from scipy.spatial.transform import Rotation
 from neurosym.errors import InputError
 from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.rigid_motions import shifted
-from neurosym.planning.staging import Staging, pose_along
+from neurosym.geometry.step_motion import Track
+from neurosym.planning.staging import Staging
 
 Array = NDArray[np.float64]
 
@@ -53,7 +53,7 @@ class Timeline:
         present, motions = staging.present, staging.motions
         if self.backwards:
             present = (*present, *(n for m in motions for n in m.parts))
-            motions = tuple(replace(m, arrives=False) for m in reversed(motions))
+            motions = tuple(m.reversed() for m in reversed(motions))
         self._motions = motions
         self._movers = [self._numbers(m.parts) for m in motions]
         places = _rows_before(staging.assembly, self._movers, self.backwards)
@@ -133,7 +133,7 @@ class Timeline:
         boxes = self.bounds_at_rest[None] + self.shifts[:, :, None]
         seen = [boxes[self.where != ABSENT] if self.where.any() else self.bounds_at_rest]
         for number, (motion, movers) in enumerate(zip(self._motions, self._movers)):
-            middle, end = self._middle(number), motion.path[-1]
+            middle, end = self._middle(number), motion.tracks[0].poses[-1]
             shift = end[:3, :3] @ middle + end[:3, 3] - middle
             seen.append(self.bounds_at_rest[movers] + self._base(number) + shift)
         all_seen = np.concatenate(seen)
@@ -142,7 +142,7 @@ class Timeline:
     def path_of(self, step: int) -> Array:
         """float64 (k, 3): the way of the middle of what moves in a step, out from where it rests."""
         number = self._played(step)
-        path, middle = self._motions[number].path, self._middle(number)
+        path, middle = self._motions[number].tracks[0].poses, self._middle(number)
         way: Array = path[:, :3, :3] @ middle + path[:, :3, 3] + self._base(number)
         return way
 
@@ -178,15 +178,14 @@ class Timeline:
         motion = self._motions[number]
         if self.backwards or motion.arrives:
             share = 1.0 - share
-        motion, base = replace(motion, arrives=False), shifted(self._base(number))
+        base = shifted(self._base(number))
         if share <= ON_PATH:
-            return {name: base @ X for name, X in motion.where(_eased(share / ON_PATH)).items()}
+            return {name: base @ X for name, X in motion.out(_eased(share / ON_PATH)).items()}
         share = _eased((share - ON_PATH) / (1 - ON_PATH))
         # What made way goes back while the others are carried on.
-        moved = {name: base @ X for name, X in motion.where(1 - share).items()}
-        arrives = self._motions[number].arrives
-        there = self._at(number if arrives else number + 1)[self._movers[number][0]]
-        carried = self._carried(base @ motion.path[-1], there, self._middle(number), share)
+        moved = {name: base @ X for name, X in motion.out(1 - share).items()}
+        there = self._at(number if motion.arrives else number + 1)[self._movers[number][0]]
+        carried = self._carried(base @ motion.tracks[0].poses[-1], there, self._middle(number), share)
         return moved | dict.fromkeys(motion.parts, carried)
 
     def _carried(self, end: Array, there: Array, middle: Array, share: float) -> Array:
@@ -195,7 +194,8 @@ class Timeline:
         over_end, over_last = end.copy(), last.copy()
         over_end[2, 3] += max(self._top - float(end[2, :3] @ middle + end[2, 3]), 0.0)
         over_last[2, 3] = max(self._top - float(middle[2]), float(last[2, 3]))
-        return pose_along(np.stack([end, over_end, over_last, last]), share, middle)
+        over = Track((), np.stack([end, over_end, over_last, last]), middle)
+        return over.at(over.key(share))
 
     @cached_property
     def _top(self) -> float:

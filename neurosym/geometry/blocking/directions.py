@@ -1,8 +1,7 @@
-"""Directions of translation: along axes, from contacts, sampled, given; and in words."""
+"""Directions of translation: along axes, from contacts, sampled, given."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -163,11 +162,3 @@ def _counted(vectors: Array) -> tuple[Array, NDArray[np.int64]]:
     _, first, counts = np.unique(labels, return_index=True, return_counts=True)
     order = np.argsort(first)
     return vectors[first[order]], counts[order]
-
-
-def in_words(vector: Sequence[float]) -> str:
-    """A direction of three numbers in words: ``+z`` along an axis of the world, its three numbers otherwise."""
-    for axis, name in enumerate("xyz"):
-        if abs(abs(vector[axis]) - 1) < 1e-9:
-            return ("+" if vector[axis] > 0 else "-") + name
-    return "(" + ", ".join(f"{float(v) + 0.0:.3g}" for v in vector) + ")"

@@ -13,9 +13,10 @@ import networkx as nx
 import numpy as np
 from numpy.typing import NDArray
 
-from neurosym.geometry.blocking.directions import in_words
 from neurosym.geometry.blocking.sweep import Sweep
+from neurosym.geometry.step_motion import Vector
 from neurosym.support.bitsets import bits, bitsets
+from neurosym.support.words import in_words
 
 if TYPE_CHECKING:
     from neurosym.geometry.assembly import Assembly
@@ -37,7 +38,7 @@ class BlockingGraph:
     def __init__(self, assembly: Assembly, directions: Array) -> None:
         self.assembly = assembly
         self.directions = directions
-        self.vectors = [tuple(map(float, d)) for d in self.directions]
+        self.vectors: list[Vector] = [(float(x), float(y), float(z)) for x, y, z in self.directions]
         self.names = assembly.names
         self.into_table = (self.directions[:, 2] < -assembly.tolerances.parallel) & assembly.has_table
         self.queries = 0

@@ -2,7 +2,7 @@
 
 Searches are counted in checks of poses, not in seconds, so the same seed gives the same path on any machine. OMPL's
 own random numbers have one seed a process, set anew for each search from the caller's generator (generators made by
-OMPL afterwards, in another's code, then follow from it, too). No path leaves here that `Path.check` has not confirmed.
+OMPL afterwards, in another's code, then follow from it, too). No path leaves here that `check_path` has not confirmed.
 """
 
 from __future__ import annotations
@@ -17,9 +17,10 @@ from numpy.typing import NDArray
 
 from neurosym.errors import InputError
 from neurosym.geometry.paths.lattice import Lattice
-from neurosym.geometry.paths.path import Kind, Path
+from neurosym.geometry.paths.path_check import check_path
 from neurosym.geometry.paths.removal import OutOfBudget, Removal
 from neurosym.geometry.rigid_motions import Interpolation, shifted
+from neurosym.geometry.step_motion import Kind, StepMotion
 
 if TYPE_CHECKING:
     from neurosym.geometry.assembly import Assembly
@@ -71,7 +72,7 @@ def extract(
     kinds: Sequence[Kind] = KINDS,
     max_checks: int = 200_000,
     seconds: float | None = None,
-) -> Path | Failure:
+) -> StepMotion | Failure:
     """A path that takes parts, moving as one, out from among others.
 
     They are out when a plane across one of the axes divides them from the others. Straight lines are not asked first:
@@ -115,7 +116,7 @@ def extract(
             poses = None
         if poses is not None:
             path = removal.path(kind, poses)
-            check = path.check(assembly, among, ground=ground)
+            check = check_path(path, assembly, among, ground=ground)
             if check.holds:
                 return path
             reasons.append(f"the path of kind {kind!r} did not pass its check: {check.reason}")

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
 from neurosym.geometry.paths.clearance import Clearance, Floor
-from neurosym.geometry.paths.path import Kind, Path, apart, bodies_of, centre_of
+from neurosym.geometry.paths.path_check import apart, bodies_of, centre_of
 from neurosym.geometry.rigid_motions import Interpolation, shifted
 from neurosym.geometry.shapes import Box
+from neurosym.geometry.step_motion import Kind, StepMotion, Track
 
 if TYPE_CHECKING:
     from neurosym.geometry.assembly import Assembly
@@ -112,7 +113,7 @@ class Removal:
         way = min(float((self._high - low).min()), float((high - self._low).min()))
         return max(way + 2 * self.assembly.touch, 0.0)
 
-    def path(self, kind: Kind, poses: list[Array]) -> Path:
+    def path(self, kind: Kind, poses: list[Array]) -> StepMotion:
         """A path through these poses, the last one out; a straight leg is added that leaves some room."""
         last = poses[-1]
         points = self.own_points @ last[:3, :3].T + last[:3, 3]
@@ -128,7 +129,8 @@ class Removal:
         while not apart(self.assembly, points + end[:3, 3] - last[:3, 3], self.other_points) or end is last:
             end = shifted(step * direction) @ last
             step *= 2
-        return Path.of(kind, self.assembly.in_mask(self.moving), np.array([*poses, end]), self.centre)
+        parts = self.assembly.in_mask(self.moving)
+        return StepMotion(parts, tracks=(Track(parts, np.array([*poses, end]), self.centre),), kind=kind)
 
     def _frame(self) -> tuple[Array, bool]:
         """The axes of the moving parts' boxes, or of their largest faces; and whether everything is boxes so turned."""

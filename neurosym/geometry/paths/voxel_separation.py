@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from neurosym.geometry.paths.grid import GridCells
-from neurosym.geometry.paths.path import Path, Track
+from neurosym.geometry.step_motion import StepMotion, Track
 from neurosym.support.bitsets import bits
 
 #: The six directions, opposite ones side by side: ``d ^ 1`` is the opposite of ``d``.
@@ -81,7 +81,7 @@ class Stuck:
     block: int
 
 
-def separation_path(cells: GridCells, separation: Separation, *, home: bool = True) -> Path:
+def separation_path(cells: GridCells, separation: Separation, *, home: bool = True) -> StepMotion:
     """The motions of a separation; the parts that leave come first among its tracks.
 
     Args:
@@ -117,7 +117,8 @@ def separation_path(cells: GridCells, separation: Separation, *, home: bool = Tr
         own = np.concatenate([cells.cells[p] for p in same]) + 0.5
         centre = cells.origin + cells.frame @ (own.mean(axis=0) * cells.pitch)
         tracks.append(Track(tuple(cells.names[p] for p in same), poses, centre))
-    return Path("moves", tuple(tracks), tuple(cells.names[p] for p in bits(separation.group)))
+    leaving = tuple(cells.names[p] for p in bits(separation.group))
+    return StepMotion(leaving, tracks=tuple(tracks), kind="moves", moves=separation.level)
 
 
 def _way_out(cells: GridCells, keys: list[dict[int, NDArray[np.int64]]], parts: list[int]) -> int:

@@ -108,9 +108,9 @@ def _blocks(staging: Staging, settings: BuildSettings) -> tuple[dict[str, Array]
     """Sizes and places of all blocks, in metres, the arm's base at the origin."""
     sizes, places = {}, {}
     ground = staging.assembly.ground
-    for motion in staging.motions:
+    for action, motion in zip(staging.plan, staging.motions):
         if not motion.arrives or len(motion.parts) != 1:
-            raise InputError(f"Expected a plan whose steps bring one block each; {motion.action!r} does not.")
+            raise InputError(f"Expected a plan whose steps bring one block each; {action!r} does not.")
     for part in staging.assembly.parts:
         if len(part.bodies) != 1 or not isinstance(part.bodies[0].shape, Box):
             raise InputError(f"Expected blocks that are one box each; {part.name!r} is none.")
