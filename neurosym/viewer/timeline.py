@@ -50,29 +50,26 @@ class Timeline:
         self.names = staging.assembly.names
         self.n_steps = len(staging.motions)
         self.backwards = bool(staging.motions) and all(m.arrives for m in staging.motions)
-        present, motions = staging.present, staging.motions
+        # From here on, times and steps are those of the film as it is made, where `_played` has turned them.
+        present, self._motions = staging.present, staging.motions
         if self.backwards:
-            present = (*present, *(n for m in motions for n in m.parts))
-            motions = tuple(m.reversed() for m in reversed(motions))
-        self._motions = motions
-        self._movers = [self._numbers(m.parts) for m in motions]
-        places = _rows_before(staging.assembly, self._movers, self.backwards)
-        where, shifts = self._between_steps(set(present), places)
-        self.where, self.shifts = (where[::-1], shifts[::-1]) if self.backwards else (where, shifts)
+            present = (*present, *(n for m in self._motions for n in m.parts))
+            self._motions = tuple(m.reversed() for m in reversed(self._motions))
+        index = staging.assembly.index
+        self._movers = [np.array([index[n] for n in m.parts], dtype=np.int64) for m in self._motions]
+        self._where, self._shifts = self._between_steps([index[n] for n in present])
+        back = -1 if self.backwards else 1
+        self.where, self.shifts = self._where[::back], self._shifts[::back]
 
-    def _numbers(self, names: Sequence[str]) -> NDArray[np.int64]:
-        return np.array([self.staging.assembly.index[n] for n in names], dtype=np.int64)
-
-    def _between_steps(self, present: set[str], places: Array) -> tuple[NDArray[np.uint8], Array]:
-        """`where` and `shifts` of the film as it is played; what is to arrive in it waits before the work."""
-        n = len(self.names)
-        where = np.zeros((self.n_steps + 1, n), dtype=np.uint8)
-        shifts = np.zeros((self.n_steps + 1, n, 3))
-        where[0, self._numbers(sorted(present))] = IN_PLACE
-        for step, (motion, movers) in enumerate(zip(self._motions, self._movers)):
+    def _between_steps(self, present: Sequence[int]) -> tuple[NDArray[np.uint8], Array]:
+        """`where` and `shifts`; what is to arrive waits before the work."""
+        n, places = len(self.names), _rows_before(self.staging.assembly, self._movers, self.backwards)
+        where, shifts = np.zeros((self.n_steps + 1, n), dtype=np.uint8), np.zeros((self.n_steps + 1, n, 3))
+        where[0, present] = IN_PLACE
+        for motion, movers, place in zip(self._motions, self._movers, places):
             waiting = movers[where[0, movers] == ABSENT]
             if motion.arrives:
-                where[0, waiting], shifts[0, waiting] = APART, places[step]
+                where[0, waiting], shifts[0, waiting] = APART, place
         for step, (motion, movers) in enumerate(zip(self._motions, self._movers)):
             where[step + 1], shifts[step + 1] = where[step], shifts[step]
             where[step + 1, movers] = IN_PLACE if motion.arrives else APART
@@ -101,10 +98,10 @@ class Timeline:
 
     def motions(self, t: float) -> Array:
         """float64 (n_parts, 4, 4): how each part has moved at time t from its rest in the work."""
-        t = self._within(t)
+        t = self._played(self._within(t))
         step = int(np.floor(t))
         X = np.tile(np.eye(4), (len(self.names), 1, 1))
-        X[:, :3, 3] = self.shifts[step]
+        X[:, :3, 3] = self._shifts[step]
         if t > step:
             index = self.staging.assembly.index
             for name, moved in self._under_way(step, t - step).items():
@@ -141,7 +138,7 @@ class Timeline:
 
     def path_of(self, step: int) -> Array:
         """float64 (k, 3): the way of the middle of what moves in a step, out from where it rests."""
-        number = self._played(step)
+        number = int(self._played(step + 0.5))
         path, middle = self._motions[number].tracks[0].poses, self._middle(number)
         way: Array = path[:, :3, :3] @ middle + path[:, :3, 3] + self._base(number)
         return way
@@ -151,19 +148,13 @@ class Timeline:
             raise InputError(f"Expected a time from 0 to {self.n_steps}; got {t!r}.")
         return float(np.clip(t, 0.0, self.n_steps))
 
-    def _played(self, step: int) -> int:
-        """The number, among the motions as they are played, of a step of the plan."""
-        return self.n_steps - 1 - step if self.backwards else step
-
-    def _at(self, time: int) -> Array:
-        """`shifts` at a whole time of the film as it is played."""
-        shifts: Array = self.shifts[self.n_steps - time if self.backwards else time]
-        return shifts
+    def _played(self, t: float) -> float:
+        """The time, in the film as it is made, of a time of the plan."""
+        return self.n_steps - t if self.backwards else t
 
     def _base(self, number: int) -> Array:
         """float64 (3,): how far from the work the path of a motion begins: 0, or where its group was set down."""
-        motion, movers = self._motions[number], self._movers[number]
-        base: Array = self._at(number + 1 if motion.arrives else number)[movers[0]]
+        base: Array = self._shifts[number + self._motions[number].arrives, self._movers[number][0]]
         return base
 
     def _middle(self, number: int) -> Array:
@@ -172,19 +163,17 @@ class Timeline:
         middle: Array = (boxes[:, 0].min(axis=0) + boxes[:, 1].max(axis=0)) / 2
         return middle
 
-    def _under_way(self, step: int, share: float) -> dict[str, Array]:
+    def _under_way(self, number: int, share: float) -> dict[str, Array]:
         """Name -> float64 (4, 4): the motions of the parts that move, when `share` of a step's time has passed."""
-        number = self._played(step)
         motion = self._motions[number]
-        if self.backwards or motion.arrives:
-            share = 1.0 - share
+        share = 1.0 - share if motion.arrives else share
         base = shifted(self._base(number))
         if share <= ON_PATH:
             return {name: base @ X for name, X in motion.out(_eased(share / ON_PATH)).items()}
         share = _eased((share - ON_PATH) / (1 - ON_PATH))
         # What made way goes back while the others are carried on.
         moved = {name: base @ X for name, X in motion.out(1 - share).items()}
-        there = self._at(number if motion.arrives else number + 1)[self._movers[number][0]]
+        there = self._shifts[number + (not motion.arrives), self._movers[number][0]]
         carried = self._carried(base @ motion.tracks[0].poses[-1], there, self._middle(number), share)
         return moved | dict.fromkeys(motion.parts, carried)
 
