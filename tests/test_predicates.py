@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import neurosym as ns
+from neurosym.geometry.step_motion import StepMotion
 from neurosym.testing.domains import check_problem
 
 part = ns.Type("part")
@@ -139,6 +140,27 @@ def test_putting_together_is_taking_apart_backwards():
     plans = set(ns.load_planner("exhaustive").all_plans(build.ground()))
     taken = set(ns.load_planner("exhaustive").all_plans(take_apart(BOX_WITH_LID).ground()))
     assert plans == {tuple(reversed(order)) for order in taken}
+
+
+def test_a_direction_becomes_the_motion_of_the_parts_that_the_action_takes_or_brings():
+    def along(direction):
+        return ns.derived(part)(lambda world, state, name: ns.Verdict(True, motion=direction))(p)
+
+    cells = {"low": [(0, 0, 0)], "high": [(0, 0, 1)]}
+    hand = ns.derived(part)(lambda world, state, name: ns.Verdict(True, motion=StepMotion(held=("low",))))(p)
+    removed = take_apart(cells, pre=[present(p), hand, along([0, 0, 2])]).ground()
+    step = removed.attempt(removed.initial, removed.actions.index("high"))
+    assert step.motion == StepMotion(("high",), (0.0, 0.0, 1.0), held=("low",))
+    place = ns.Action("place", p, pre=[~present(p), along(np.array([0, 0, 1]))], eff=[present(p)], label="{p}")
+    world = ns.Assembly.from_cells(cells)
+    placed = ns.Domain("build", fluents=[present], actions=[place]).problem(
+        world=world, objects={part: world.names}, init=[], goal=[present("low")]
+    )
+    assert ns.solve(placed).motions == (StepMotion(("low",), (0.0, 0.0, -1.0), arrives=True),)
+    for wrong in ("up", (0, 0), (0, 0, 0), [[1, 0, 0]]):
+        search = take_apart(cells, pre=[present(p), along(wrong)]).ground()
+        with pytest.raises(ns.ContractError, match="a StepMotion as motion, or with a direction of three numbers"):
+            search.attempt(search.initial, 0)
 
 
 @pytest.mark.parametrize("wrong", ["present", ns.Fluent("pair", part, part), None])

@@ -425,6 +425,25 @@ def test_the_command_says_when_something_moved(tmp_path, capfd):
     assert "Step 1, post: " in capfd.readouterr().out
 
 
+def test_files_that_say_no_parts_or_no_motion_are_read(plan_file, capfd):
+    """As version 0.1 wrote them for predicates that gave a direction, a list of poses, or nothing."""
+    document = json.loads(plan_file.read_text())
+    directions = [step["how"] for step in document["steps"]]
+    up = np.tile(np.eye(4), (2, 1, 1))
+    up[1, :3, 3] = 5 * np.array(directions[1])
+    ways = [directions[0], up.tolist(), None, *directions[3:]]
+    document["steps"] = [{"action": step["action"], "how": how} for step, how in zip(document["steps"], ways)]
+    plan_file.write_text(json.dumps(document))
+    saved = read_plan(plan_file)
+    assert saved.motions[2] is None
+    staging = stage(saved.problem, saved.plan, saved.motions)
+    assert [m.parts for m in staging.motions] == [(name,) for name in saved.plan]
+    assert np.allclose(staging.motions[1].tracks[0].poses, up)
+    assert staging.guessed == {2}
+    assert all(np.allclose(m.direction, d) for m, d in zip(staging.motions[3:], directions[3:]))
+    assert call("replay", plan_file) == 0
+
+
 @pytest.mark.parametrize(
     ("change", "expected"),
     [

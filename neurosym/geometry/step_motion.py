@@ -212,6 +212,8 @@ class StepMotion:
             if not tracks:
                 raise ValueError("a path without tracks")
             return cls(parts, None, tuple(tracks), held, path["kind"], moves, arrives)
+        except InputError:
+            raise
         except (AttributeError, KeyError, TypeError, ValueError) as error:
             raise InputError(f"Expected a step with a direction, or with a path; got {error}.") from None
 

@@ -118,11 +118,7 @@ def stage(problem: Problem, plan: Sequence[str], motions: Sequence[StepMotion | 
 
 
 def staged(
-    assembly: Assembly,
-    present: Sequence[str],
-    plan: Sequence[str],
-    motions: Sequence[StepMotion],
-    colours: Mapping[str, tuple[float, float, float]] | None = None,
+    assembly: Assembly, present: Sequence[str], plan: Sequence[str], motions: Sequence[StepMotion]
 ) -> Staging:
     """A plan in space whose motions say which parts move: straight ones lead as far as the others reach.
 
@@ -130,7 +126,6 @@ def staged(
         present: names of the parts that are there at first.
         plan: names of the actions.
         motions: one a step.
-        colours: see `Staging`.
     """
     there, long = set(present), []
     for motion in motions:
@@ -138,7 +133,7 @@ def staged(
         long.append(motion if motion.tracks else _straight(assembly, motion, others))
         there = others | set(motion.parts) if motion.arrives else others
     guessed = frozenset(i for i, m in enumerate(motions) if not m.tracks and not m.direction)
-    return Staging(assembly, tuple(present), tuple(plan), tuple(long), colours or {}, guessed=guessed)
+    return Staging(assembly, tuple(present), tuple(plan), tuple(long), guessed=guessed)
 
 
 def building(

@@ -209,9 +209,7 @@ class _Run:
         if self.window is not None:
             self.window.tick()
 
-    def _judged(
-        self, action: str, motion: StepMotion, before: Snapshot, blocked: tuple[str, ...]
-    ) -> StepReplay:
+    def _judged(self, action: str, motion: StepMotion, before: Snapshot, blocked: tuple[str, ...]) -> StepReplay:
         """What moved since `before`; what has arrived is to stand too."""
         moved_bodies: dict[str, list[float]] = {}
         for (part, _), far in self.world.displacement(before).items():
@@ -225,19 +223,8 @@ class _Run:
         reason = reason_of(motion, moved, blocked, distance, share, farthest)
         if moved and stood:
             reason += " One cube alone may fall, by this rule."
-        return StepReplay(
-            action,
-            motion.parts,
-            motion.arrives,
-            distance,
-            share,
-            farthest,
-            moved,
-            blocked,
-            stood,
-            reason,
-            motion.held,
-        )
+        judged = (distance, share, farthest, moved, blocked, stood, reason)
+        return StepReplay(action, motion.parts, motion.arrives, *judged, motion.held)
 
 
 def smallest_part(assembly: Assembly) -> float:
