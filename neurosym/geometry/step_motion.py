@@ -168,23 +168,17 @@ class StepMotion:
 
     def to_json(self) -> dict[str, Any]:
         """For a file: ``how`` (a direction or poses, as lists), ``parts``, and what else there is to say."""
-        document: dict[str, Any] = {"how": self.direction and list(self.direction)}
-        if self.parts:
-            document["parts"] = list(self.parts)
+        how: Any = self.direction and list(self.direction)
+        path = None
         if self.tracks and not self.direction:
             tracks = [
                 {"parts": list(t.parts), "centre": t.centre.tolist(), "poses": _in_time(t.poses, self.arrives).tolist()}
                 for t in self.tracks
             ]
-            document["how"] = tracks[0]["poses"]
-            document["path"] = {"kind": self.kind, "leaving": list(self.parts), "tracks": tracks}
-        if self.moves > 1:
-            document["moves"] = self.moves
-        if self.held:
-            document["held"] = list(self.held)
-        if self.arrives:
-            document["arrives"] = True
-        return document
+            how, path = tracks[0]["poses"], {"kind": self.kind, "leaving": list(self.parts), "tracks": tracks}
+        moves = self.moves if self.moves > 1 else None
+        rest = {"parts": list(self.parts), "path": path, "moves": moves, "held": list(self.held)}
+        return {"how": how, **{k: v for k, v in {**rest, "arrives": self.arrives}.items() if v}}
 
     @classmethod
     def from_json(cls, document: Mapping[str, Any]) -> StepMotion:
@@ -217,19 +211,18 @@ class StepMotion:
         except (AttributeError, KeyError, TypeError, ValueError) as error:
             raise InputError(f"Expected a step with a direction, or with a path; got {error}.") from None
 
-    def __str__(self) -> str:
+    @property
+    def course(self) -> str:
+        """``along +z``, ``by a path (3 moves)``; nothing where it is not said."""
         if self.direction:
-            text = f"along {in_words(self.direction)}"
-        elif self.tracks:
-            kind = f"{self.moves} moves" if self.kind == "moves" else self.kind
-            text = f"{'in' if self.arrives else 'out'} by a path ({kind})"
-        else:
-            text = ""
-        if len(self.parts) > 1:
-            text = f"{', '.join(self.parts)} together, {text}"
-        if self.held:
-            text = f"{text}, while {', '.join(self.held)} {'is' if len(self.held) == 1 else 'are'} held"
-        return text
+            return f"along {in_words(self.direction)}"
+        return f"by a path ({f'{self.moves} moves' if self.kind == 'moves' else self.kind})" if self.tracks else ""
+
+    def __str__(self) -> str:
+        together = f"{', '.join(self.parts)} together, " if len(self.parts) > 1 else ""
+        way = ("in " if self.arrives else "out ") if self.tracks and not self.direction else ""
+        held = f", while {', '.join(self.held)} {'is' if len(self.held) == 1 else 'are'} held" if self.held else ""
+        return f"{together}{way}{self.course}{held}"
 
 
 def check_motions(motions: Sequence[StepMotion | None], count: int) -> None:

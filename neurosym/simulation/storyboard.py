@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 from neurosym.planning.staging import Staging
 from neurosym.simulation.filming import DEFAULT_CAMERA, TOPS_CAMERA
 from neurosym.simulation.looks import Camera
-from neurosym.support.words import in_words
 
 Array = NDArray[np.float64]
 
@@ -60,9 +59,8 @@ def describe(staging: Staging, step: int) -> str:
     said = f"{verb} {name}{' with ' + _few(others) if others else ''}"
     if not motion.arrives and not around >= set(staging.there(step)):
         said = f"take {name} off {_few(sorted(around - {part}))}"
-    way = f"along {in_words(motion.direction)}" if motion.direction else "along a path"
     held = f", {_few(motion.held)} held" if motion.held else ""
-    return f"{said}, {way}{held}"
+    return f"{said}, {motion.course}{held}"
 
 
 def _few(names: tuple[str, ...] | list[str]) -> str:

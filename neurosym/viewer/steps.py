@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from html import escape
 from typing import TYPE_CHECKING
 
-from neurosym.support.words import in_words
 from neurosym.viewer.panels import some
 
 if TYPE_CHECKING:
@@ -31,7 +30,7 @@ def caption(shown: Shown, t: float) -> str:
         text = name if shown.search.solved else f"{name}: no plan. The tab Plan says why, as far as it is known."
     elif now is not None:
         action, motion = timeline.staging.plan[now], timeline.staging.motions[now]
-        said = f"{_who(action, motion)} {_verb(motion)} {escape(_way(motion))}"
+        said = f"{_who(action, motion)} {_verb(motion)} {escape(motion.course)}"
         text = f"Step {now + 1} of {total}: {said}{_meanwhile(motion)}"
     elif t <= 0:
         text = f"{name}: before the first of {total} steps"
@@ -78,7 +77,7 @@ def in_short(action: str, motion: StepMotion) -> str:
         others = list(motion.parts)
     together = f", together with {some(others)}" if others else ""
     held = f", while {some(motion.held)} {_is(motion.held)} held" if motion.held else ""
-    return f"{_way(motion)}{together}{_making_way(motion)}{held}"
+    return f"{motion.course}{together}{_making_way(motion)}{held}"
 
 
 def _none(shown: Shown) -> str:
@@ -117,12 +116,6 @@ def _verb(motion: StepMotion) -> str:
     if motion.arrives:
         return "comes" if one else "come"
     return "leaves" if one else "leave"
-
-
-def _way(motion: StepMotion) -> str:
-    if motion.direction:
-        return f"along {in_words(motion.direction)}"
-    return f"along a path of {len(motion.tracks[0].poses)} poses"
 
 
 def _meanwhile(motion: StepMotion) -> str:
