@@ -227,7 +227,7 @@ def test_many_steps_go_faster_but_can_be_followed():
 
 def test_many_parts_have_colours_that_are_neither_black_nor_white_and_fixed_ones_are_grey():
     assembly = ns.Assembly.from_cells({f"{i:02}": [(i, 0, 0)] for i in range(60)}).with_fixed(["07"])
-    colours = part_colours(Staging(assembly, assembly.names, (), {"05": (0.1, 0.5, 0.6)}))
+    colours = part_colours(Staging(assembly, assembly.names, colours={"05": (0.1, 0.5, 0.6)}))
     assert colours["07"] == FIXED
     assert colours["05"] == (0.1, 0.5, 0.6)
     assert len(set(colours.values())) == 60
