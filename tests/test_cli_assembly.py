@@ -17,7 +17,7 @@ from neurosym.cli import main
 from neurosym.commands.assemblies import FileOptions, problem_at
 from neurosym.commands.spread import spread
 from neurosym.geometry.step_motion import StepMotion
-from neurosym.planning.plan_files import read_plan
+from neurosym.plan_files.reading import read_plan
 
 SHARED = Path(__file__).parents[1] / ".." / "shared" / "data"
 

@@ -25,7 +25,7 @@ from neurosym.cli import main
 from neurosym.errors import InputError, NeurosymError, UnknownNameError
 from neurosym.geometry.assembly import Body, Box, Mesh, Part
 from neurosym.geometry.step_motion import StepMotion, Track
-from neurosym.planning.plan_files import read_plan
+from neurosym.plan_files.reading import read_plan
 from neurosym.planning.staging import Staging, building, stage, staged
 from neurosym.simulation import Physics, World, open_clients, replay_plan, replay_staging
 from neurosym.simulation.cutting import cut_into_convex

@@ -28,7 +28,7 @@ from neurosym.commands.common import (
 from neurosym.errors import InputError
 from neurosym.language.options import check_options
 from neurosym.language.problem_family import ProblemFamily
-from neurosym.planning.plan_files import SCHEMA
+from neurosym.plan_files.writing import problem_part, result_part
 from neurosym.support.words import joined
 
 if TYPE_CHECKING:
@@ -130,15 +130,15 @@ def plan(
         # The k best of none: ask for one, to be told why there is none.
         results = [solve(problem, rng=np.random.default_rng(seed), **settings)]
     answer = {
-        **_header(family.name, problem, number, options),
+        **problem_part(family.name, problem, number, options),
         **source,
         **settings,
         "budget": budget.limits,
         "seed": seed,
-        **_result(results[0]),
+        **result_part(results[0]),
     }
     if k is not None:
-        answer["plans"] = [_result(result) for result in results]
+        answer["plans"] = [result_part(result) for result in results]
     if out is not None:
         write_json(answer, out)
     if as_json:
@@ -206,34 +206,6 @@ def pair_of(text: str) -> tuple[str, str]:
     if len(names) != 2 or not all(names):
         raise InputError(f"Expected --before A,B: two names with a comma between; got {text!r}.")
     return names[0], names[1]
-
-
-def _header(domain: str, problem: Problem, number: int | None, options: dict[str, Any]) -> dict[str, Any]:
-    from neurosym import __version__
-
-    named = {"schema": SCHEMA, "neurosym": __version__, "domain": domain, "problem": problem.name, "number": number}
-    return {**named, "actions": list(problem.actions), "options": options}
-
-
-def _result(result: PlanResult) -> dict[str, Any]:
-    steps = zip(result.plan or (), result.motions or (None,) * len(result.plan or ()))
-    return {
-        "status": result.status.name,
-        "sentence": result.status.sentence,
-        "plan": None if result.plan is None else list(result.plan),
-        "steps": [{"action": a, **(motion.to_json() if motion else {"how": None})} for a, motion in steps],
-        "best_prefix": list(result.best_prefix),
-        "refusals": [
-            {"after": list(r.after), "action": r.action, "reason": r.reason, "because": list(r.because)}
-            for r in result.blame
-        ],
-        "iterations": result.iterations,
-        "expansions": result.expansions,
-        "attempts": result.attempts,
-        "seconds": result.seconds,
-        "cost": result.cost,
-        "why_not": None if result.why_not is None else result.why_not.as_json(),
-    }
 
 
 def _show(problem: Problem, results: Sequence[PlanResult], answer: dict[str, Any]) -> None:

@@ -97,7 +97,7 @@ def render(
 def _staging(
     what: str, plan: Path | None, number: int | None, files: FileOptions, options: dict[str, Any]
 ) -> tuple[Staging, str]:
-    from neurosym.planning.plan_files import read_plan
+    from neurosym.plan_files.reading import read_plan
     from neurosym.planning.staging import stage
 
     given = {key: value for key, value in options.items() if value is not None}

@@ -46,7 +46,7 @@ def replay(
     as_json: AsJson = False,
 ) -> None:
     """Do a plan in PyBullet, with gravity: did the rest stand still at each step, and by how much did it move?"""
-    from neurosym.planning.plan_files import read_plan
+    from neurosym.plan_files.reading import read_plan
     from neurosym.simulation.replay import replay_plan
 
     saved = read_plan(path)

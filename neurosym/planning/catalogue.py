@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import importlib.util
+import itertools
 from importlib.metadata import EntryPoint
 from pathlib import Path
 
@@ -20,10 +21,19 @@ def summary(entry: EntryPoint) -> str:
         tree = ast.parse(source.read_text(encoding="utf-8"))
     except (OSError, ValueError, SyntaxError):
         return entry.value
-    kinds = ast.FunctionDef | ast.ClassDef
-    found = next((node for node in tree.body if isinstance(node, kinds) and node.name == entry.attr), None)
-    said = ast.get_docstring(found) if found is not None else None
-    return " ".join(said.split("\n\n")[0].split()) if said else entry.value
+    text = _docstring(tree, entry.attr)
+    return " ".join(text.split("\n\n")[0].split()) if text else entry.value
+
+
+def _docstring(tree: ast.Module, name: str) -> str | None:
+    """Of a function or class, or the text that stands below an assignment."""
+    for node, following in itertools.zip_longest(tree.body, tree.body[1:]):
+        if isinstance(node, ast.FunctionDef | ast.ClassDef) and node.name == name:
+            return ast.get_docstring(node)
+        if isinstance(node, ast.Assign) and name in {getattr(target, "id", None) for target in node.targets}:
+            text = getattr(getattr(following, "value", None), "value", None)
+            return text if isinstance(text, str) else None
+    return None
 
 
 def weights_beside(entry: EntryPoint) -> dict[str, list[str]]:

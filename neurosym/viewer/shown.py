@@ -21,7 +21,7 @@ from neurosym.planning.validation import validate
 from neurosym.viewer.timeline import Timeline
 
 if TYPE_CHECKING:
-    from neurosym.planning.plan_files import SavedPlan
+    from neurosym.plan_files.reading import SavedPlan
 
 #: Makes a problem of options given by name.
 Maker = Callable[..., Problem]

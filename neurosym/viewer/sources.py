@@ -11,7 +11,7 @@ from typing import Any
 from neurosym.errors import InputError, UnknownNameError
 from neurosym.geometry.readers.reading import Reading
 from neurosym.language.problem import Problem
-from neurosym.planning.plan_files import SavedPlan, problem_of, read_document, read_plan
+from neurosym.plan_files.reading import SavedPlan, problem_of, read_document, read_plan
 from neurosym.registry import domain_names, load_domain
 from neurosym.viewer.planning import problem_maker
 from neurosym.viewer.shown import Maker, Query

@@ -11,14 +11,11 @@ from typing import TYPE_CHECKING, Any
 from neurosym.errors import InputError
 from neurosym.geometry.readers.reading import referenced
 from neurosym.geometry.step_motion import StepMotion
+from neurosym.plan_files.writing import SCHEMA
 from neurosym.registry import load_domain
 
 if TYPE_CHECKING:
     from neurosym.language.problem import Problem
-
-#: Of the file. Raise it when a reader of the old one would go wrong.
-SCHEMA = 1
-
 
 @dataclass(frozen=True, eq=False)
 class SavedPlan:

@@ -1,0 +1,1 @@
+"""plan.json: a problem, its plan and what the search did, written and read back."""

@@ -1,0 +1,39 @@
+"""What `neurosym plan --out` writes of a problem and of a result."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from neurosym import __version__
+
+if TYPE_CHECKING:
+    from neurosym.language.problem import Problem
+    from neurosym.planning.planner import PlanResult
+
+#: Of the file. Raise it when a reader of the old one would go wrong.
+SCHEMA = 1
+
+
+def problem_part(domain: str, problem: Problem, number: int | None, options: Mapping[str, Any]) -> dict[str, Any]:
+    """Which problem was solved: of which family, with which number and options."""
+    named = {"schema": SCHEMA, "neurosym": __version__, "domain": domain, "problem": problem.name, "number": number}
+    return {**named, "actions": list(problem.actions), "options": dict(options)}
+
+
+def result_part(result: PlanResult) -> dict[str, Any]:
+    """What came of it."""
+    steps = zip(result.plan or (), result.motions or (None,) * len(result.plan or ()))
+    return {
+        "status": result.status.name,
+        "sentence": result.status.sentence,
+        "plan": None if result.plan is None else list(result.plan),
+        "steps": [{"action": a, **(motion.to_json() if motion else {"how": None})} for a, motion in steps],
+        "best_prefix": list(result.best_prefix),
+        "refusals": [
+            {"after": list(r.after), "action": r.action, "reason": r.reason, "because": list(r.because)}
+            for r in result.blame
+        ],
+        **{name: getattr(result, name) for name in ("iterations", "expansions", "attempts", "seconds", "cost")},
+        "why_not": None if result.why_not is None else result.why_not.as_json(),
+    }
