@@ -1,8 +1,8 @@
 """The priors by name, as entry points declare them: each is a `NetworkPrior` of the recipe of that name.
 
 All take ``weights=FILE`` (None: the bundled ones), ``domain=NAME`` (whose bundled weights), ``encoder=NAME`` (what
-`fit` builds) and ``device=``; see `NetworkPrior`. What is in them stands in `learned_priors.recipes`. The paper is Burke,
-Subr, Ramamoorthy (RA-L 2021).
+`fit` builds) and ``device=``; see `NetworkPrior`. What is in them stands in `learned_priors.recipes`. The paper is
+Burke, Subr, Ramamoorthy (RA-L 2021).
 """
 
 from __future__ import annotations
