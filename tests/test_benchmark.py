@@ -83,7 +83,8 @@ def test_a_plan_with_false_motions_is_refused_as_by_solve(monkeypatch):
 
         def plan(self, problem, scores, *, budget, rng):
             result = ns.load_planner("backtracking").plan(problem, scores, budget=budget, rng=rng)
-            return replace(result, how=(replace(result.how[0], direction=(-1.0, 0.0, 0.0)), *result.how[1:]))
+            first, *others = result.motions
+            return replace(result, motions=(replace(first, direction=(-1.0, 0.0, 0.0)), *others))
 
     drawer = ns.load_domain("assembly").problem(5)
     assert ns.validate(drawer, ns.solve(drawer).plan), "the order alone is right"
