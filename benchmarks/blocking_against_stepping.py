@@ -26,6 +26,7 @@ import numpy as np
 import trimesh
 
 import neurosym as ns
+from neurosym.geometry.queries import AssemblyGeometry
 
 DATA = Path(__file__).parents[2] / "shared" / "data"
 DIRECTIONS = np.array([[0, 0, 1.0], [1, 0, 0], [0, 1, 0], [0, 0, -1.0], [-1, 0, 0], [0, -1, 0]])
@@ -71,7 +72,7 @@ def compare(title: str, meshes: Mapping[str, Any], sample: int | None, cells: Ce
     for _ in range(5):
         assembly = ns.Assembly.from_meshes(meshes)  # one that remembers nothing
         start = time.process_time()
-        graph = assembly.blocking(DIRECTIONS)
+        graph = AssemblyGeometry(assembly).blocking(DIRECTIONS)
         for k, there in enumerate(states):
             mask = assembly.mask(there)
             for name in there:

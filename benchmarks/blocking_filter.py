@@ -5,10 +5,8 @@ from __future__ import annotations
 import random
 import time
 
-import numpy as np
-
 import neurosym as ns
-from neurosym.geometry.blocking.sweep import exits_along
+from neurosym.geometry.queries import AssemblyGeometry
 from neurosym.support.bitsets import bits
 
 #: One question to the table is shorter than a clock is exact.
@@ -21,7 +19,8 @@ questions = wrong = 0
 for number in range(0, 240, 30):
     assembly = ns.Assembly.from_cells(soma.solutions()[number])
     start = time.perf_counter()
-    graph = assembly.blocking()
+    geometry = AssemblyGeometry(assembly)
+    graph = geometry.blocking()
     filtered += time.perf_counter() - start
     n = len(assembly.bodies)
     unfiltered += n * (n - 1) * len(graph.directions)
@@ -34,11 +33,10 @@ for number in range(0, 240, 30):
             quick = graph.blockers(part, direction, there)
         table += (time.perf_counter() - start) / REPEATS
         start = time.perf_counter()
-        others = [o for o in bits(there) if o != part]
-        slow = exits_along(assembly, part, np.asarray(graph.directions[direction]), others)
+        slow = geometry.hits_along(part, graph.directions[direction], there & ~(1 << part))
         stepped += time.perf_counter() - start
         questions += 1
-        wrong += set(bits(quick)) != set(slow)
+        wrong += quick != slow
     pairs = graph.queries
 print(f"pairs of cubes put to FCL: {pairs} of {n * (n - 1) * len(graph.directions)} in the last cube")
 print(f"table of all pairs, six directions: {1e3 * filtered / 8:.1f} ms a cube")

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 import neurosym as ns
+from neurosym.geometry.queries import AssemblyGeometry
 from neurosym.simulation import ReplayReport, replay_plan
 from neurosym.support.files import write_text
 
@@ -101,7 +102,7 @@ def stands(world: ns.Assembly, parts: int, friction: float | None = None, patch_
     changed = world if friction is None else replace(world, friction=friction)
     if patch_shrink is not None:
         changed = replace(changed, tolerances=replace(changed.tolerances, patch_shrink=patch_shrink))
-    return bool(changed.afresh().stability().standing(parts).stands)
+    return bool(AssemblyGeometry(changed, tabulate=False).stability.standing(parts).stands)
 
 
 def table(found: list[Comparison]) -> list[str]:

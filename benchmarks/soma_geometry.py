@@ -7,7 +7,7 @@ import statistics
 import time
 
 import neurosym as ns
-from domains.collapse import RULES, Stacks
+from domains.collapse import RULES, stacks_of
 
 
 def build(number: int, rule: str) -> tuple[ns.Problem, float]:
@@ -15,10 +15,10 @@ def build(number: int, rule: str) -> tuple[ns.Problem, float]:
     start = time.perf_counter()
     problem = soma.problem(number, collapse=rule)
     if rule == "rigid":
-        problem.world.blocking()
-        problem.world.stability()
+        problem.geometry.blocking()
+        _ = problem.geometry.stability
     else:
-        Stacks.of(problem.world)
+        stacks_of(problem.geometry)
     return problem, 1e3 * (time.perf_counter() - start)
 
 

@@ -17,6 +17,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import numpy as np
 
 import neurosym as ns
+from neurosym.geometry.queries import AssemblyGeometry
 from neurosym.support.bitsets import bits
 
 DATA = Path(__file__).parents[2] / "shared" / "data"
@@ -35,7 +36,7 @@ def bricks(length: int, height: int) -> ns.Assembly:
 
 def questions(assembly: ns.Assembly) -> list[int]:
     """Bitsets of parts, each what is left after one more removal from the last that stood."""
-    rng, stability = np.random.default_rng(0), assembly.afresh().stability()
+    rng, stability = np.random.default_rng(0), AssemblyGeometry(assembly, tabulate=False).stability
     height = np.array([assembly.body_bounds[assembly.owners == k, 1, 2].max() for k in range(len(assembly))])
     there, asked = (1 << len(assembly)) - 1, []
     while len(asked) < QUESTIONS and there & ~assembly.fixed_mask:
@@ -50,7 +51,7 @@ def questions(assembly: ns.Assembly) -> list[int]:
 
 def measure(name: str, assembly: ns.Assembly) -> None:
     asked = questions(assembly)
-    quick, slow = assembly.stability(), assembly.afresh().stability()
+    quick, slow = AssemblyGeometry(assembly).stability, AssemblyGeometry(assembly, tabulate=False).stability
     start = time.process_time()
     answers = [quick.standing(subset).stands for subset in asked]
     middle = time.process_time()
@@ -76,7 +77,7 @@ if __name__ == "__main__":
             measure(name, ns.Assembly.load(DATA / name))
         else:
             dome = ns.Assembly.load(DATA / name)
-            stability, full, seconds = dome.stability(), (1 << len(dome)) - 1, []
+            stability, full, seconds = AssemblyGeometry(dome).stability, (1 << len(dome)) - 1, []
             stability.standing(full)
             for part in bits(full & ~dome.fixed_mask)[::17]:
                 start = time.process_time()

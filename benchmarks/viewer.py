@@ -17,7 +17,7 @@ from neurosym.geometry.step_motion import StepMotion
 from neurosym.planning.staging import staged
 from neurosym.viewer.scene import PlanScene
 from neurosym.viewer.server import LocalServer
-from neurosym.viewer.timeline import Timeline, part_bounds
+from neurosym.viewer.timeline import Timeline
 
 VAULT = Path(__file__).parents[2] / "shared" / "data" / "crossvault"
 UPDATES = 400
@@ -40,7 +40,7 @@ def rate(scene: PlanScene, times: np.ndarray) -> float:
 
 
 assembly = parts()
-order = [assembly.names[i] for i in np.argsort(-part_bounds(assembly)[:, 1, 2], kind="stable")]
+order = [assembly.names[i] for i in np.argsort(-assembly.part_bounds[:, 1, 2], kind="stable")]
 up = [StepMotion((name,), (0.0, 0.0, 1.0)) for name in order]
 start = time.perf_counter()
 timeline = Timeline(staged(assembly, assembly.names, order, up))

@@ -18,7 +18,8 @@ from domains.assembly_removal import apart_one_by_one
 from domains.assembly_samples import SAMPLES, TRAINING, sample
 from neurosym.errors import AssemblyError, InputError, UnknownNameError
 from neurosym.geometry.assembly import NO_TABLE, Assembly
-from neurosym.geometry.blocking.directions import Directions, directions_for
+from neurosym.geometry.blocking.directions import Directions
+from neurosym.geometry.queries import AssemblyGeometry
 from neurosym.language import Domain, Problem
 from neurosym.language.problem import as_names
 from neurosym.language.problem_family import ProblemFamily
@@ -105,7 +106,8 @@ class AssemblyFamily(ProblemFamily):
         assembly = assembly.with_table(_table(assembly, gravity, ground))
         if len(assembly.fixed) == len(assembly):
             raise InputError(f"Expected a part that is not fixed, to take out; all {len(assembly)} are. Fix fewer.")
-        vectors = directions_for(assembly, directions)
+        geometry = AssemblyGeometry(assembly)
+        vectors = geometry.directions(directions)
         hands = int(held) if gravity else 0
         setting = Setting(tuple(map(tuple, vectors.tolist())), paths, bool(groups), bool(gravity), hands)
         details = {
@@ -115,7 +117,7 @@ class AssemblyFamily(ProblemFamily):
             **{key: getattr(setting, key) for key in ("paths", "groups", "gravity", "held")},
         }
         make = apart_in_groups if groups else apart_one_by_one
-        return make(assembly, setting, before=before, name=name or called, family=self.name, details=details)
+        return make(geometry, setting, before=before, name=name or called, family=self.name, details=details)
 
     def numbers(self, part: str = "test", *, split: int = 0) -> tuple[int, ...]:
         """Numbers of the samples: see `domains.assembly_samples`."""
@@ -163,12 +165,9 @@ def _table(assembly: Assembly, gravity: bool, ground: float | bool | None) -> fl
         return None if ground else NO_TABLE
     lowest = float(assembly.bounds[0, 2])
     if ground > lowest + assembly.touch:
-        below = [n for n in assembly.names if _lowest(assembly, n) < ground - assembly.touch]
+        lows = zip(assembly.names, assembly.part_bounds[:, 0, 2])
+        below = [name for name, low in lows if low < ground - assembly.touch]
         raise AssemblyError(
             f"Expected parts on or above the ground at {ground:g}; {', '.join(below[:8])} reach down to {lowest:g}."
         )
     return float(ground)
-
-
-def _lowest(assembly: Assembly, name: str) -> float:
-    return float(assembly.body_bounds[assembly.owners == assembly.index[name], 0, 2].min())

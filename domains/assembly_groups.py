@@ -22,11 +22,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from domains.assembly_paths import grid_of
 from domains.assembly_splits import Block, Splitter
 from domains.assembly_why import explain_groups
 from neurosym.errors import InputError
-from neurosym.geometry.assembly import Assembly
+from neurosym.geometry.queries import AssemblyGeometry
 from neurosym.geometry.step_motion import StepMotion
 from neurosym.language import Action, Domain, Fluent, GroundProblem, Problem, Type
 from neurosym.language.explanation import WhyNot
@@ -48,7 +47,7 @@ State = tuple[int, tuple[int, ...]]
 
 
 def apart_in_groups(
-    assembly: Assembly,
+    geometry: AssemblyGeometry,
     setting: Setting,
     *,
     before: Iterable[tuple[str, str]],
@@ -57,11 +56,11 @@ def apart_in_groups(
     details: Mapping[str, Any],
 ) -> Problem:
     """The problem in which an action, named by a part, splits that part's block."""
-    pairs = tuple(before)
-    anchors = assembly.fixed or (_lowest(assembly, setting, pairs),)
+    pairs, assembly = tuple(before), geometry.assembly
+    anchors = assembly.fixed or (_lowest(geometry, setting, pairs),)
     split = Action("split", _p, pre=[~apart(_p), ~anchor(_p)], eff=[apart(_p)], label="{p}")
     return Domain("assembly-groups", fluents=[apart, anchor], actions=[split]).problem(
-        world=assembly,
+        world=geometry,
         objects={part: assembly.names},
         init=[anchor(n) for n in anchors],
         goal=[apart(n) for n in assembly.names if n not in anchors],
@@ -69,12 +68,13 @@ def apart_in_groups(
         name=name,
         family=family,
         details={**details, "anchor": list(anchors)},
-        semantics=GroupSemantics(assembly, setting, assembly.mask(anchors)),
+        semantics=GroupSemantics(geometry, setting, assembly.mask(anchors)),
     )
 
 
-def _lowest(assembly: Assembly, setting: Setting, before: Sequence[tuple[str, str]]) -> str:
+def _lowest(geometry: AssemblyGeometry, setting: Setting, before: Sequence[tuple[str, str]]) -> str:
     """The first anchor where nothing is fixed: low under gravity, large, and not named in the precedence."""
+    assembly = geometry.assembly
     named = {n for pair in before for n in pair}
     free = [n for n in assembly.names if n not in named]
     if not free:
@@ -82,11 +82,11 @@ def _lowest(assembly: Assembly, setting: Setting, before: Sequence[tuple[str, st
             "Expected a part, in groups without a fixed one, that `before` does not name: it stays as the anchor. "
             "Fix a part."
         )
-    volumes = assembly.stability().masses / [p.density for p in assembly.parts]
+    volumes = geometry.stability.masses / [p.density for p in assembly.parts]
 
     def key(name: str) -> tuple[float, float, int]:
         number = assembly.index[name]
-        low = assembly.body_bounds[assembly.owners == number, 0, 2].min() if setting.gravity else 0.0
+        low = assembly.part_bounds[number, 0, 2] if setting.gravity else 0.0
         return round(float(low / assembly.touch)), -round(float(volumes[number] / assembly.touch**3)), number
 
     return min(free, key=key)
@@ -95,8 +95,9 @@ def _lowest(assembly: Assembly, setting: Setting, before: Sequence[tuple[str, st
 class GroupSemantics(Semantics):
     """What a split changes: the search over partitions, and its replay."""
 
-    def __init__(self, assembly: Assembly, setting: Setting, anchors: int) -> None:
-        self.assembly, self.setting, self.anchors = assembly, setting, anchors
+    def __init__(self, geometry: AssemblyGeometry, setting: Setting, anchors: int) -> None:
+        self.geometry, self.setting, self.anchors = geometry, setting, anchors
+        self.assembly = assembly = geometry.assembly
         #: Whether one block stands: on a ground, around fixed parts, or under gravity.
         self.standing = setting.gravity or assembly.has_table or bool(assembly.fixed)
 
@@ -104,8 +105,8 @@ class GroupSemantics(Semantics):
         return GroupSearch(self, problem.symbols)
 
     def replay(self, problem: Problem, order: Sequence[str], motions: Sequence[StepMotion | None]) -> Validation:
-        """Replays an order on blocks that are plain sets; each split is asked of the pairs concerned, afresh."""
-        world = self.assembly.afresh()
+        """Replays an order on blocks that are plain sets; each split is asked of the pairs concerned, anew."""
+        world = self.geometry.anew()
         splitter = Splitter(world, self.setting)
         everything = frozenset(world.names)
         grounded = everything if self.standing else frozenset[str]()
@@ -135,28 +136,28 @@ class GroupSemantics(Semantics):
             if block == grounded:
                 grounded = block - leaving
             anchors.add(name)
-        together = [b for b in blocks if len(b - set(world.fixed)) + bool(b & set(world.fixed)) > 1]
+        together = [b for b in blocks if len(b - set(self.assembly.fixed)) + bool(b & set(self.assembly.fixed)) > 1]
         if together:
             left = tuple(n for n in world.names if n in together[0])
             said = f"After all {len(order)} actions the goal is missed: {listed(left)} are still together."
             return Validation(False, len(order), left, said)
         return Validation(True)
 
-    def stands_at_first(self, world: Assembly) -> Verdict:
+    def stands_at_first(self, world: AssemblyGeometry) -> Verdict:
         """Whether the whole stands as it is, where it has to."""
         if not self.setting.gravity:
             return Verdict(True)
-        answer = world.stability().standing_when_held((1 << len(world)) - 1, self.setting.held)
+        answer = world.stability.standing_when_held((1 << len(world)) - 1, self.setting.held)
         falling = world.in_mask(answer.moving)
         said = f"The assembly does not stand as it is: {listed(falling)} would fall."
         return Verdict(answer.stands, () if answer.stands else falling, "" if answer.stands else said)
 
     def refute(self, problem: Problem) -> WhyNot | None:
         """A proof that some block never comes apart, even without gravity, where any order of splits will do."""
-        if self.setting.paths == "any" and grid_of(self.assembly) is None:
+        if self.setting.paths == "any" and self.geometry.cells is None:
             return None  # the searches for paths prove nothing
         relaxed = replace(self.setting, gravity=False, held=0)
-        splitter = Splitter(self.assembly, relaxed)
+        splitter = Splitter(self.geometry, relaxed)
         waiting = [(Block((1 << len(self.assembly)) - 1, self.standing), self.anchors)]
         done: list[str] = []
         while waiting:
@@ -175,7 +176,7 @@ class GroupSemantics(Semantics):
                 refused[self.assembly.names[number]] = Rejection(verdict.reason, verdict.because, proved=verdict.proved)
             else:
                 if refused and all(r.proved for r in refused.values()):
-                    why = explain_groups(self.assembly, relaxed, tuple(done), [block], refused)
+                    why = explain_groups(self.geometry, relaxed, tuple(done), [block], refused)
                     return replace(why, relaxed=self.setting.gravity)
         return None
 
@@ -190,7 +191,7 @@ class GroupSemantics(Semantics):
             state = answer.state
         refused = {a: search.attempt(state, a) for a in search.candidates(state)}
         stuck = {search.actions[a]: r for a, r in refused.items() if isinstance(r, Rejection)}
-        return explain_groups(self.assembly, self.setting, tuple(done), search.blocks(state), stuck)
+        return explain_groups(self.geometry, self.setting, tuple(done), search.blocks(state), stuck)
 
 
 class GroupSearch:
@@ -199,7 +200,7 @@ class GroupSearch:
     def __init__(self, rules: GroupSemantics, symbols: GroundProblem) -> None:
         self.rules, self.symbols = rules, symbols
         self.assembly = rules.assembly
-        self.splitter = Splitter(rules.assembly, rules.setting)
+        self.splitter = Splitter(rules.geometry, rules.setting)
         self.actions = symbols.actions
         self.classes = symbols.classes
         whole = (1 << len(rules.assembly)) - 1
@@ -222,7 +223,7 @@ class GroupSearch:
             assert isinstance(answer, Rejection)
             return answer
         if state == self.initial:
-            self._at_first = self._at_first or self.rules.stands_at_first(self.assembly)
+            self._at_first = self._at_first or self.rules.stands_at_first(self.rules.geometry)
             if not self._at_first.holds:
                 return Rejection(self._at_first.reason, self._at_first.because, (action,))
         number = self._numbers[action]

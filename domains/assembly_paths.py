@@ -8,8 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from neurosym.geometry.assembly import Assembly
-from neurosym.geometry.paths.grid import GridCells, cells_of
-from neurosym.geometry.paths.voxel_moves import Separation, Stuck, first_separation, separation_path
+from neurosym.geometry.paths.grid import GridCells
+from neurosym.geometry.paths.voxel_search import first_separation
+from neurosym.geometry.paths.voxel_separation import Separation, Stuck, separation_path
+from neurosym.geometry.queries import AssemblyGeometry
 from neurosym.geometry.step_motion import StepMotion
 from neurosym.support.bitsets import bits
 from neurosym.support.words import listed
@@ -35,7 +37,7 @@ def ground_of(assembly: Assembly) -> float | None:
     return assembly.ground if assembly.has_table else None
 
 
-def way_out(assembly: Assembly, moving: int, among: int, *, shifting: bool) -> StepMotion | NoWay:
+def way_out(geometry: AssemblyGeometry, moving: int, among: int, *, shifting: bool) -> StepMotion | NoWay:
     """A path on which parts (a bitset), moving as one, leave the others in `among`.
 
     Args:
@@ -44,53 +46,52 @@ def way_out(assembly: Assembly, moving: int, among: int, *, shifting: bool) -> S
 
     Asked twice, the answer is the same.
     """
-    cells = grid_of(assembly)
-
-    def moves() -> StepMotion | NoWay:
-        assert cells is not None
-        found = first_separation(
-            cells,
-            among,
-            fixed=assembly.fixed_mask & among,
-            ground=ground_of(assembly),
-            accept=lambda group: group == moving,
-            max_states=MAX_STATES,
-        )
-        return _way(cells, found)
-
-    def search() -> StepMotion | NoWay:
-        from neurosym.geometry.paths.extraction import KINDS, Failure, extract
-
-        rng = np.random.default_rng([zlib.crc32(f"{moving:x} {among:x}".encode())])
-        kinds = KINDS if cells is None else KINDS[:1]  # on cells the lattice is all there is by translations
-        found = extract(
-            assembly, moving, among, rng=rng, ground=ground_of(assembly), kinds=kinds, max_checks=MAX_CHECKS
-        )
-        if isinstance(found, Failure):
-            return NoWay(found.reason, found.because, found.proved and cells is not None)
-        return found
-
-    exact = shifting and cells is not None
-    return assembly.remember(f"way out {moving:x} {among:x} {exact}", moves if exact else search)
+    exact = shifting and geometry.cells is not None
+    return geometry.ask_once(_by_moves if exact else _by_search, moving, among)
 
 
-def separation(assembly: Assembly, block: int, *, standing: bool) -> StepMotion | NoWay:
+def _by_moves(geometry: AssemblyGeometry, moving: int, among: int) -> StepMotion | NoWay:
+    assembly, cells = geometry.assembly, geometry.cells
+    assert cells is not None
+    found = first_separation(
+        cells,
+        among,
+        fixed=assembly.fixed_mask & among,
+        ground=ground_of(assembly),
+        accept=lambda group: group == moving,
+        max_states=MAX_STATES,
+    )
+    return _way(cells, found)
+
+
+def _by_search(geometry: AssemblyGeometry, moving: int, among: int) -> StepMotion | NoWay:
+    from neurosym.geometry.paths.extraction import KINDS, Failure, extract
+
+    assembly = geometry.assembly
+    rng = np.random.default_rng([zlib.crc32(f"{moving:x} {among:x}".encode())])
+    kinds = KINDS if geometry.cells is None else KINDS[:1]  # on cells the lattice is all there is by translations
+    found = extract(assembly, moving, among, rng=rng, ground=ground_of(assembly), kinds=kinds, max_checks=MAX_CHECKS)
+    if isinstance(found, Failure):
+        return NoWay(found.reason, found.because, found.proved and geometry.cells is not None)
+    return found
+
+
+def separation(geometry: AssemblyGeometry, block: int, *, standing: bool) -> StepMotion | NoWay:
     """The first separation of a block of parts of cells into two, by shifts of groups, with the fewest moves.
 
     Args:
         block: a bitset of parts.
         standing: whether it is what stands on the ground and holds the fixed parts; otherwise it is in the hand.
     """
-    cells = grid_of(assembly)
+    return geometry.ask_once(_separation, block, standing)
+
+
+def _separation(geometry: AssemblyGeometry, block: int, standing: bool) -> StepMotion | NoWay:
+    assembly, cells = geometry.assembly, geometry.cells
     assert cells is not None
-
-    def search() -> StepMotion | NoWay:
-        fixed = assembly.fixed_mask if standing else 0
-        ground = ground_of(assembly) if standing else None
-        found = first_separation(cells, block, fixed=fixed, ground=ground, max_states=MAX_STATES)
-        return _way(cells, found)
-
-    return assembly.remember(f"separation {block:x} {standing}", search)
+    fixed = assembly.fixed_mask if standing else 0
+    ground = ground_of(assembly) if standing else None
+    return _way(cells, first_separation(cells, block, fixed=fixed, ground=ground, max_states=MAX_STATES))
 
 
 def _way(cells: GridCells, found: Separation | Stuck) -> StepMotion | NoWay:
@@ -99,10 +100,3 @@ def _way(cells: GridCells, found: Separation | Stuck) -> StepMotion | NoWay:
     names = tuple(cells.names[p] for p in bits(found.block))
     said = f"No moves of groups separate what is wanted of {listed(names)}, in {found.explored:,} states."
     return NoWay(said, names, found.proved)
-
-
-def grid_of(assembly: Assembly) -> GridCells | None:
-    """The grid that all parts are made of, if there is one."""
-    return assembly.remember("grid of cells", lambda: cells_of(assembly))
-
-

@@ -10,15 +10,13 @@ import numpy as np
 
 from domains.assembly_paths import NoWay, ground_of, way_out
 from domains.assembly_why import explain_removal, refute_removal
-from neurosym.geometry.assembly import Assembly
-from neurosym.geometry.blocking.sweep import exits_along
 from neurosym.geometry.paths.path_check import check_path
+from neurosym.geometry.queries import AssemblyGeometry
 from neurosym.geometry.step_motion import GROUND, StepMotion
 from neurosym.language import Action, Derived, Domain, Fluent, Problem, Simulation, State, Type, formulas, predicates
 from neurosym.language.explanation import WhyNot
 from neurosym.language.search_problem import Verdict
 from neurosym.language.semantics import Semantics
-from neurosym.support.bitsets import bits
 from neurosym.support.words import listed
 
 if TYPE_CHECKING:
@@ -31,7 +29,7 @@ _p = part("p")
 
 
 def apart_one_by_one(
-    assembly: Assembly,
+    world: AssemblyGeometry,
     setting: Setting,
     *,
     before: Iterable[tuple[str, str]],
@@ -40,14 +38,15 @@ def apart_one_by_one(
     details: Mapping[str, Any],
 ) -> Problem:
     """The problem in which an action, named by a part, removes that part."""
-    geometry = [can_leave(setting)(_p)]
+    assembly = world.assembly
+    possible = [can_leave(setting)(_p)]
     if setting.gravity:
-        geometry += [stands_at_first(setting)(), predicates.stable_without(present, held=setting.held)(_p)]
-    remove = Action("remove", _p, pre=[present(_p), ~fixed(_p), *geometry], eff=[~present(_p)], label="{p}")
+        possible += [stands_at_first(setting)(), predicates.stable_without(present, held=setting.held)(_p)]
+    remove = Action("remove", _p, pre=[present(_p), ~fixed(_p), *possible], eff=[~present(_p)], label="{p}")
     loose = [n for n in assembly.names if n not in assembly.fixed]
     judged_alike = setting.gravity and not setting.held and not assembly.fixed and setting.paths == "straight"
     return Domain("assembly", fluents=[present, fixed], actions=[remove]).problem(
-        world=assembly,
+        world=world,
         objects={part: assembly.names},
         init=[*(present(n) for n in assembly.names), *(fixed(n) for n in assembly.fixed)],
         goal=[~present(n) for n in loose],
@@ -67,17 +66,19 @@ class RemovalSemantics(Semantics):
     setting: Setting
 
     def refute(self, problem: Problem) -> WhyNot | None:
-        return refute_removal(problem.world, self.setting)
+        assert problem.geometry is not None
+        return refute_removal(problem.geometry, self.setting)
 
     def explain(self, problem: Problem, done: Sequence[str]) -> WhyNot | None:
-        return explain_removal(problem.world, self.setting, problem.before, tuple(done))
+        assert problem.geometry is not None
+        return explain_removal(problem.geometry, self.setting, problem.before, tuple(done))
 
 
 def can_leave(setting: Setting) -> Derived:
     """``free(p)``: part p can leave, along a straight line or else, if paths are asked for, along a path."""
     straight = predicates.free(present, directions=setting.directions)
 
-    def ask(world: Assembly, state: State, p: str) -> Verdict:
+    def ask(world: AssemblyGeometry, state: State, p: str) -> Verdict:
         verdict = straight.function(world, state, p)
         if verdict.holds or setting.paths == "straight":
             return verdict
@@ -87,21 +88,20 @@ def can_leave(setting: Setting) -> Derived:
             return Verdict(False, found.because, found.reason, proved=found.proved)
         return Verdict(True, (), f"{p} is free by a path.", motion=found)
 
-    def check(world: Assembly, state: State, motion: StepMotion, p: str) -> Verdict:
+    def check(world: AssemblyGeometry, state: State, motion: StepMotion, p: str) -> Verdict:
         if motion.parts != (p,) or not (motion.direction or motion.tracks):
             return ask(world, state, p)
         there = state.mask(present, world.names)
         if motion.direction is None:
             if setting.paths == "straight":
                 return Verdict(False, (p,), f"{p} cannot go {motion}: that is no straight line.")
-            clear = check_path(motion, world, there, ground=ground_of(world))
+            clear = check_path(motion, world.assembly, there, ground=ground_of(world.assembly))
             return Verdict(clear.holds, clear.parts, clear.reason or f"{p} is free {motion}.", motion=motion)
         direction = np.array(motion.direction)
         if min(np.abs(direction - d).max() for d in setting.directions) > 1e-9:
             return Verdict(False, (p,), f"{p} cannot go {motion}: that is none of the problem's directions.")
-        hit = exits_along(world, world.index[p], direction, bits(there & ~(1 << world.index[p])))
-        names = tuple(world.names[o] for o in hit)
-        if world.has_table and direction[2] < -world.tolerances.parallel:
+        names = world.in_mask(world.hits_along(world.index[p], direction, there & ~(1 << world.index[p])))
+        if world.assembly.has_table and direction[2] < -world.assembly.tolerances.parallel:
             names = (*names, GROUND)
         if names:
             return Verdict(False, tuple(n for n in names if n != GROUND), f"{p} cannot go {motion}: {listed(names)}.")
@@ -113,19 +113,19 @@ def can_leave(setting: Setting) -> Derived:
 def stands_at_first(setting: Setting) -> Derived:
     """``stands()``: the whole stands before anything is taken out. Afterwards each removal has seen to it."""
 
-    def ask(world: Assembly, state: State) -> Verdict:
+    def ask(world: AssemblyGeometry, state: State) -> Verdict:
         there = state.mask(present, world.names)
         if there != (1 << len(world)) - 1:
             return Verdict(True)
-        answer = world.stability().standing_when_held(there, setting.held)
+        answer = world.stability.standing_when_held(there, setting.held)
         if answer.stands:
             return Verdict(True)
         falling = world.in_mask(answer.moving)
         said = f"The assembly does not stand as it is: {listed(falling)} would fall."
         return Verdict(False, falling, said, ())
 
-    def formula(world: Assembly) -> formulas.AnyOf:
-        if world.stability().standing_when_held((1 << len(world)) - 1, setting.held).stands:
+    def formula(world: AssemblyGeometry) -> formulas.AnyOf:
+        if world.stability.standing_when_held((1 << len(world)) - 1, setting.held).stands:
             return formulas.AnyOf((formulas.Way("", ()),))
         return formulas.AnyOf(tuple(formulas.Way(f"after {n}", (~present(n),)) for n in world.names))
 

@@ -15,10 +15,9 @@ import heapq
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from domains.assembly_paths import NoWay, grid_of, ground_of, separation, way_out
-from neurosym.geometry.assembly import Assembly
-from neurosym.geometry.blocking.sweep import exits_along
+from domains.assembly_paths import NoWay, ground_of, separation, way_out
 from neurosym.geometry.paths.path_check import check_path
+from neurosym.geometry.queries import AssemblyGeometry
 from neurosym.geometry.step_motion import StepMotion
 from neurosym.language.predicates import stands
 from neurosym.language.search_problem import Verdict
@@ -46,17 +45,16 @@ class Half:
 
 
 class Splitter:
-    """Answers how a part is split from its anchor. An assembly made by `afresh` is asked pair by pair, without tables.
+    """Answers how a part is split from its anchor.
 
     Args:
-        assembly: with its fixed parts and its ground.
+        geometry: of the assembly, with its fixed parts and its ground.
         setting: the options of the problem.
     """
 
-    def __init__(self, assembly: Assembly, setting: Setting) -> None:
-        self.assembly, self.setting = assembly, setting
-        self.graph = assembly.blocking(setting.directions)
-        self._hit_by: dict[int, list[int]] = {}
+    def __init__(self, geometry: AssemblyGeometry, setting: Setting) -> None:
+        self.geometry, self.assembly, self.setting = geometry, geometry.assembly, setting
+        self.graph = geometry.blocking(setting.directions)
 
     def split(self, block: Block, part: int, anchor: int) -> Verdict:
         """The smallest half with `part`, without the parts in `anchor` (a bitset), that comes off.
@@ -81,7 +79,7 @@ class Splitter:
                 return Verdict(True, motion=StepMotion(names, self.graph.vectors[half.direction], held=held))
             refused = refused or standing
             taken = half.leaving | self.assembly.mask(standing.because)
-            grown = self._closure(taken, half.direction, block.parts)
+            grown = self.graph.carried(taken, half.direction, block.parts)
             stays = anchor if half.leaving >> part & 1 else 1 << part
             if not grown & stays:
                 self._push(queue, Half(grown, half.direction), kind, block, part)
@@ -117,13 +115,13 @@ class Splitter:
             if d < 0 or (block.stands and self.graph.into_table[d]):
                 return Verdict(False, (), f"{said} cannot go {motion}: that is none of the problem's ways out.")
             for mine in bits(leaving):
-                hit = self.assembly.in_mask(self._hits(mine, d, rest))
+                hit = self.assembly.in_mask(self.graph.blockers(mine, d, rest))
                 if hit:
                     return Verdict(False, hit, f"{said} cannot go {motion}: {listed(hit)} would be hit.")
         if block.stands and self.setting.gravity:
             if len(motion.held) > self.setting.held or self.assembly.mask(motion.held) & ~rest:
                 return Verdict(False, motion.held, f"{', '.join(motion.held)} cannot all be held.")
-            answer = self.assembly.stability().standing(rest, held=self.assembly.mask(motion.held))
+            answer = self.geometry.stability.standing(rest, held=self.assembly.mask(motion.held))
             if not answer.stands:
                 falling = self.assembly.in_mask(answer.moving)
                 return Verdict(False, falling, f"Without {said}, {listed(falling)} would fall.")
@@ -135,49 +133,13 @@ class Splitter:
         """What leaves along a direction: the asked part with what it hits, or all but what it is hit by; 0: neither."""
         if block.stands and self.graph.into_table[d]:
             return 0, 0
-        with_part = self._closure(1 << part, d, block.parts)
+        with_part = self.graph.carried(1 << part, d, block.parts)
         if with_part & anchor:
             with_part = 0
         if block.stands and anchor & self.assembly.fixed_mask:
             return with_part, 0
-        staying = self._closure(1 << part, d, block.parts, backwards=True)
+        staying = self.graph.carried(1 << part, d, block.parts, backwards=True)
         return with_part, 0 if staying & anchor else block.parts & ~staying
-
-    def _closure(self, group: int, d: int, among: int, *, backwards: bool = False) -> int:
-        """All in `among` that a group hits along a direction, that these hit in turn, ...; backwards: by whom."""
-        closed, waiting = 0, group & among
-        while waiting:
-            closed |= waiting
-            found = 0
-            if not backwards:
-                for one in bits(waiting):
-                    found |= self._hits(one, d, among & ~closed)
-            elif self.assembly.keeps_answers:
-                for one in bits(waiting):
-                    found |= self._hitters(d)[one] & among
-            else:
-                for other in bits(among & ~closed):
-                    if self._hits(other, d, waiting):
-                        found |= 1 << other
-            waiting = found & ~closed
-        return closed
-
-    def _hitters(self, d: int) -> list[int]:
-        """For each part a bitset of those that hit it along a direction."""
-        if d not in self._hit_by:
-            hit_by = [0] * len(self.assembly)
-            for part, blockers in enumerate(self.graph.by_part[d]):
-                for other in bits(blockers):
-                    hit_by[other] |= 1 << part
-            self._hit_by[d] = hit_by
-        return self._hit_by[d]
-
-    def _hits(self, part: int, d: int, others: int) -> int:
-        """Those of `others` that a part hits along a direction."""
-        if self.assembly.keeps_answers:
-            return self.graph.blockers(part, d, others)
-        found = exits_along(self.assembly, part, self.graph.directions[d], bits(others & ~(1 << part)))
-        return sum(1 << o for o in found)
 
     def _push(self, queue: list[tuple[int, int, int, Half]], half: Half, kind: int, block: Block, part: int) -> None:
         side = half.leaving if half.leaving >> part & 1 else block.parts & ~half.leaving
@@ -187,7 +149,7 @@ class Splitter:
         if not (block.stands and self.setting.gravity):
             return Verdict(True)
         names = self.assembly.in_mask(leaving)
-        return stands(self.assembly, block.parts & ~leaving, names, held=self.setting.held)
+        return stands(self.geometry, block.parts & ~leaving, names, held=self.setting.held)
 
     def _number(self, motion: StepMotion) -> int:
         for d, vector in enumerate(self.graph.vectors):
@@ -203,9 +165,9 @@ class Splitter:
             if block.stands and self.graph.into_table[d]:
                 said.append(f"{self.graph.describe(d)}: into the table")
                 continue
-            hit = self._hits(part, d, block.parts)
+            hit = self.graph.blockers(part, d, block.parts)
             because |= hit
-            closed = self.assembly.in_mask(self._closure(1 << part, d, block.parts))
+            closed = self.assembly.in_mask(self.graph.carried(1 << part, d, block.parts))
             said.append(f"{self.graph.describe(d)}: it moves {listed(closed)}")
         reason = f"{name} cannot be separated from {listed(kept)} along any direction ({'; '.join(said)})."
         return Verdict(False, self.assembly.in_mask(because), reason)
@@ -215,8 +177,8 @@ class Splitter:
     def _by_path(self, block: Block, part: int, anchor: int) -> Verdict:
         """Off by a path: of cells, the first separation of the block by moves of groups; else the part by itself."""
         name = self.assembly.names[part]
-        if not (block.stands and self.setting.gravity) and grid_of(self.assembly) is not None:
-            found = separation(self.assembly, block.parts, standing=block.stands)
+        if not (block.stands and self.setting.gravity) and self.geometry.cells is not None:
+            found = separation(self.geometry, block.parts, standing=block.stands)
             if isinstance(found, NoWay):
                 others = self.assembly.in_mask(block.parts & ~(1 << part))
                 return Verdict(False, others, found.reason, proved=found.proved)
@@ -225,7 +187,7 @@ class Splitter:
                 reason = f"{name} stays with its anchor: {listed(found.parts)} can be separated first."
                 return Verdict(False, found.parts, reason)
             return Verdict(True, motion=found)
-        out = way_out(self.assembly, 1 << part, block.parts, shifting=False)
+        out = way_out(self.geometry, 1 << part, block.parts, shifting=False)
         if isinstance(out, NoWay):
             # The part may come off together with others, which this search does not try.
             return Verdict(False, out.because, out.reason, proved=False)

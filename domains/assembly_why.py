@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from domains.assembly_paths import NoWay, way_out
-from neurosym.geometry.assembly import Assembly
+from neurosym.geometry.queries import AssemblyGeometry
 from neurosym.geometry.step_motion import StepMotion
 from neurosym.language.explanation import Blocked, Cycle, Fall, WhyNot, blockers_of, smallest_cycle
 from neurosym.language.predicates import losses
@@ -18,24 +18,24 @@ if TYPE_CHECKING:
     from domains.assembly_splits import Block
 
 
-def refute_removal(assembly: Assembly, setting: Setting) -> WhyNot | None:
+def refute_removal(geometry: AssemblyGeometry, setting: Setting) -> WhyNot | None:
     """A proof, without a search, that some parts never leave along straight lines, one at a time; None: all do.
 
     Without gravity what is free stays free, so the order in which parts are peeled off does not matter.
     """
     if setting.paths != "straight":
         return None
-    graph = assembly.blocking(setting.directions)
-    there, done = (1 << len(assembly)) - 1, list[int]()
+    graph = geometry.blocking(setting.directions)
+    there, done = (1 << len(geometry)) - 1, list[int]()
     while free := [p for p in bits(there) if graph.free_directions(p, there)]:
         done += free
         there &= ~sum(1 << p for p in free)
-    kept = there & ~assembly.fixed_mask
+    kept = there & ~geometry.assembly.fixed_mask
     if not kept:
         return None
     return WhyNot(
-        after=tuple(assembly.names[p] for p in done),
-        left=assembly.in_mask(there),
+        after=tuple(geometry.names[p] for p in done),
+        left=geometry.in_mask(there),
         blocked=tuple(b for p in bits(kept) for b in blockers_of(graph, p, there, table=True)),
         cycle=smallest_cycle(graph, kept),
         relaxed=setting.gravity,
@@ -43,34 +43,34 @@ def refute_removal(assembly: Assembly, setting: Setting) -> WhyNot | None:
 
 
 def explain_removal(
-    assembly: Assembly, setting: Setting, before: Sequence[tuple[str, str]], done: tuple[str, ...]
+    geometry: AssemblyGeometry, setting: Setting, before: Sequence[tuple[str, str]], done: tuple[str, ...]
 ) -> WhyNot:
     """Why nothing more can be removed after `done`, the longest prefix that works."""
-    there = (1 << len(assembly)) - 1 & ~assembly.mask(done)
-    graph = assembly.blocking(setting.directions)
+    there = (1 << len(geometry)) - 1 & ~geometry.mask(done)
+    graph = geometry.blocking(setting.directions)
     blocked: list[Blocked] = []
     falls: list[Fall] = []
     waiting: list[tuple[str, str]] = []
     unproved: list[str] = []
-    for part in bits(there & ~assembly.fixed_mask):
-        name = assembly.names[part]
+    for part in bits(there & ~geometry.assembly.fixed_mask):
+        name = geometry.names[part]
         if not graph.free_directions(part, there):
             way: StepMotion | NoWay = NoWay("", (), True)
             if setting.paths == "any":
-                way = way_out(assembly, 1 << part, there, shifting=not setting.gravity)
+                way = way_out(geometry, 1 << part, there, shifting=not setting.gravity)
             if isinstance(way, NoWay):
                 blocked += blockers_of(graph, part, there, table=True)
                 unproved += [] if way.proved else [name]
                 continue
         waiting += [(name, first) for first, then in before if then == name and first not in done]
         if setting.gravity:
-            answer = assembly.stability().standing_when_held(there & ~(1 << part), setting.held)
+            answer = geometry.stability.standing_when_held(there & ~(1 << part), setting.held)
             if not answer.stands:
-                falls.append(fall(assembly, 1 << part, answer.moving, setting.held))
-    kept = assembly.mask({b.part for b in blocked})
+                falls.append(fall(geometry, 1 << part, answer.moving, setting.held))
+    kept = geometry.mask({b.part for b in blocked})
     return WhyNot(
         after=done,
-        left=assembly.in_mask(there),
+        left=geometry.in_mask(there),
         blocked=tuple(blocked),
         cycle=smallest_cycle(graph, kept),
         falls=tuple(falls),
@@ -79,14 +79,14 @@ def explain_removal(
     )
 
 
-def fall(assembly: Assembly, leaving: int, moving: int, held: int) -> Fall:
+def fall(geometry: AssemblyGeometry, leaving: int, moving: int, held: int) -> Fall:
     """What falls (a bitset) when the parts in `leaving` go."""
-    lost = losses(assembly, moving, leaving)
-    return Fall(assembly.in_mask(leaving), assembly.in_mask(moving), lost, held)
+    lost = losses(geometry, moving, leaving)
+    return Fall(geometry.in_mask(leaving), geometry.in_mask(moving), lost, held)
 
 
 def explain_groups(
-    assembly: Assembly,
+    geometry: AssemblyGeometry,
     setting: Setting,
     done: tuple[str, ...],
     blocks: Sequence[Block],
@@ -99,29 +99,29 @@ def explain_groups(
         blocks: of more than one part.
         refused: part that is no anchor -> why it cannot be split off.
     """
-    graph = assembly.blocking(setting.directions)
+    graph = geometry.blocking(setting.directions)
     blocked: list[Blocked] = []
     falls: list[Fall] = []
     cycles: list[Cycle] = []
     unproved: list[str] = []
     left = 0
     for block in blocks:
-        names = [n for n in assembly.in_mask(block.parts) if n in refused]
+        names = [n for n in geometry.in_mask(block.parts) if n in refused]
         if not names:
             continue
         left |= block.parts
         for name in names:
-            blocked += blockers_of(graph, assembly.index[name], block.parts, table=block.stands)
+            blocked += blockers_of(graph, geometry.index[name], block.parts, table=block.stands)
             if not refused[name].proved:
                 unproved.append(name)
         cycle = smallest_cycle(graph, block.parts)
         if cycle is not None:
             cycles.append(cycle)
         if block.stands and setting.gravity:
-            falls += _falls_of_groups(assembly, setting, block, names)
+            falls += _falls_of_groups(geometry, setting, block, names)
     return WhyNot(
         after=done,
-        left=assembly.in_mask(left),
+        left=geometry.in_mask(left),
         blocked=tuple(blocked),
         cycle=min(cycles, key=lambda c: len(c.parts), default=None),
         falls=tuple(falls),
@@ -129,16 +129,16 @@ def explain_groups(
     )
 
 
-def _falls_of_groups(assembly: Assembly, setting: Setting, block: Block, names: Sequence[str]) -> list[Fall]:
+def _falls_of_groups(geometry: AssemblyGeometry, setting: Setting, block: Block, names: Sequence[str]) -> list[Fall]:
     """For each part the smallest group that could leave with it, and what would fall then."""
-    graph = assembly.blocking(setting.directions)
+    graph = geometry.blocking(setting.directions)
     found: dict[int, Fall] = {}
     for name in names:
-        number = assembly.index[name]
+        number = geometry.index[name]
         groups = [graph.leaving_group(number, d, block.parts) for d in range(len(graph.vectors))]
         leaving = min((g for g in groups if g and g != block.parts), key=int.bit_count, default=0)
         if leaving and leaving not in found:
-            answer = assembly.stability().standing_when_held(block.parts & ~leaving, setting.held)
+            answer = geometry.stability.standing_when_held(block.parts & ~leaving, setting.held)
             if not answer.stands:
-                found[leaving] = fall(assembly, leaving, answer.moving, setting.held)
+                found[leaving] = fall(geometry, leaving, answer.moving, setting.held)
     return list(found.values())

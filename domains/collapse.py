@@ -22,10 +22,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from neurosym.errors import AssemblyError
-from neurosym.geometry.assembly import Assembly, Box
-from neurosym.geometry.blocking.sweep import drops_onto
+from neurosym.geometry.assembly import Assembly
+from neurosym.geometry.blocking.stepping import drops_onto
 from neurosym.geometry.contact import collision
-from neurosym.geometry.contact.contacts import TABLE, near_pairs
+from neurosym.geometry.contact.contacts import TABLE
+from neurosym.geometry.mesh.broad_phase import overlapping_pairs
+from neurosym.geometry.queries import AssemblyGeometry
+from neurosym.geometry.shapes import Box
 from neurosym.language import Derived, Fluent, State
 from neurosym.language.formulas import AnyOf, Way
 from neurosym.language.search_problem import Verdict
@@ -39,7 +42,7 @@ MAY_MOVE = {"cubes": 1, "strict": 0}
 #: How far cubes over one another may be out of line, as a share of their edge.
 SQUARELY = 0.01
 
-_DOWN = np.array([[0.0, 0.0, -1.0]])
+_DOWN = ((0.0, 0.0, -1.0),)
 
 
 @dataclass(frozen=True)
@@ -57,22 +60,6 @@ class Stacks:
     owner: tuple[int, ...]
     _cubes: dict[int, int] = field(default_factory=dict, repr=False)
 
-    @classmethod
-    def of(cls, world: Assembly) -> Stacks:
-        """The stacks of an assembly of cubes; computed once for it."""
-        return world.remember("stacks", lambda: cls._find(world))
-
-    @classmethod
-    def _find(cls, world: Assembly) -> Stacks:
-        below = world.blocking(_DOWN).by_body[0]
-        own, over = [0] * len(world), [0] * len(world)
-        for cube, owner in enumerate(world.owners):
-            own[owner] |= 1 << cube
-            for other in bits(below[cube]):
-                over[world.owners[other]] |= 1 << cube
-        return cls(tuple(own), tuple(o & ~m for o, m in zip(over, own)), tuple(map(int, world.owners)))
-
-
     def cubes_of(self, pieces: int) -> int:
         """All cubes of the pieces in a bitset; each set is gathered once."""
         cubes = self._cubes.get(pieces)
@@ -84,24 +71,39 @@ class Stacks:
         return cubes
 
 
+def stacks_of(world: AssemblyGeometry) -> Stacks:
+    """The stacks of an assembly of cubes; computed once for it."""
+    return world.ask_once(_stacks)
+
+
+def _stacks(world: AssemblyGeometry) -> Stacks:
+    below, owners = world.blocking(_DOWN).by_body[0], world.assembly.owners.tolist()
+    own, over = [0] * len(world), [0] * len(world)
+    for cube, owner in enumerate(owners):
+        own[owner] |= 1 << cube
+        for other in bits(below[cube]):
+            over[owners[other]] |= 1 << cube
+    return Stacks(tuple(own), tuple(o & ~m for o, m in zip(over, own)), tuple(owners))
+
+
 def keeps_standing(present: Fluent, rule: str) -> Derived:
     """``keeps_standing(p)``: at most `MAY_MOVE` cubes move when piece p is deleted."""
     limit = MAY_MOVE[rule]
     atom_of = cache(present)  # atoms are checked when they are made: once a piece will do
 
-    def keeps_standing(world: Assembly, state: State, p: str) -> Verdict:
+    def keeps_standing(world: AssemblyGeometry, state: State, p: str) -> Verdict:
         number = world.index[p]
         there = state.mask(present, world.names) & ~(1 << number)
-        if world.keeps_answers:
-            stacks = Stacks.of(world)
+        if world.tabulate:
+            stacks = stacks_of(world)
             moving = stacks.over[number] & stacks.cubes_of(there)
         else:
-            moving = _falling(world, there, number)
+            moving = _falling(world.assembly, there, number)
         return _STANDS if moving.bit_count() <= limit else collapse(world, number, moving)
 
-    def collapse(world: Assembly, number: int, moving: int) -> Verdict:
+    def collapse(world: AssemblyGeometry, number: int, moving: int) -> Verdict:
         """The refusal for cubes that would move. On the way of every refused attempt, so kept short."""
-        counts = [(-(own & moving).bit_count(), i) for i, own in enumerate(Stacks.of(world).own) if own & moving]
+        counts = [(-(own & moving).bit_count(), i) for i, own in enumerate(stacks_of(world).own) if own & moving]
         names = world.names
         because = tuple([names[i] for _, i in counts])
         # As long as any limit + 1 of these cubes are there, they move; the fewest pieces that own so many.
@@ -116,8 +118,8 @@ def keeps_standing(present: Fluent, rule: str) -> Derived:
         falling = f"{total} cube{'s' if total > 1 else ''} of {', '.join(because)}"
         return Verdict(False, because, _SAYS[rule].format(names[number], falling), tuple(until), unconditional=True)
 
-    def formula(world: Assembly, p: str) -> AnyOf:
-        stacks = Stacks.of(world)
+    def formula(world: AssemblyGeometry, p: str) -> AnyOf:
+        stacks = stacks_of(world)
         over = stacks.over[world.index[p]]
         count = {world.names[i]: (own & over).bit_count() for i, own in enumerate(stacks.own) if own & over}
         # At most `limit` cubes may move: of so many pieces over it at the most some may still be there.
@@ -132,7 +134,7 @@ _SAYS = {"cubes": "Without {}, {} would fall.", "strict": "Without {}, {} would 
 
 
 def _falling(world: Assembly, there: int, removed: int) -> int:
-    """Asked afresh: settle the cubes with and without piece `removed`, and see which come to lie lower."""
+    """Asked anew: settle the cubes with and without piece `removed`, and see which come to lie lower."""
     with_it = _settled(world, there | 1 << removed)
     without = _settled(world, there)
     return sum(1 << cube for cube, z in without.items() if with_it[cube] - z > world.smallest_extent / 2)
@@ -155,7 +157,7 @@ def _settled(world: Assembly, there: int) -> dict[int, float]:
 def check_cubes(world: Assembly, rule: str) -> None:
     """Refuse what the rules `cubes` and `strict` cannot judge: anything but equal upright cubes."""
     advice = f"The rule {rule!r} judges unit cubes; use collapse='rigid' for other shapes."
-    if not world.all_boxes:
+    if not world.bodies.all_boxes:
         odd = next(p.name for p in world.parts if not all(isinstance(b.shape, Box) for b in p.bodies))
         raise AssemblyError(f"Expected pieces made of equal cubes; {odd!r} is not. {advice}")
     sizes = np.array([b.shape.size for b in world.bodies if isinstance(b.shape, Box)])
@@ -175,12 +177,12 @@ def check_cubes(world: Assembly, rule: str) -> None:
         raise AssemblyError(f"Expected cubes on one grid, squarely over one another; some overhang others. {advice}")
 
 
-def check_standing(world: Assembly, rule: str) -> None:
+def check_standing(geometry: AssemblyGeometry, rule: str) -> None:
     """Refuse a puzzle that floats or falls by itself: under `cubes` a cube, else a piece, with nothing to stand on.
 
     The whole is judged: a problem may start from any part of it, also from one that no order of removals leads to.
     """
-    present = (1 << len(world)) - 1
+    world, present = geometry.assembly, (1 << len(geometry)) - 1
     if rule == "cubes":
         # A cube may stand on its own piece: the rule takes the pieces' cubes for independent.
         for cube, z in _settled(world, present).items():
@@ -193,7 +195,7 @@ def check_standing(world: Assembly, rule: str) -> None:
         return
     # Whoever stands on the table, then whoever stands on those, and so on.
     carriers: dict[int, set[int]] = {}
-    for contact in world.contacts():
+    for contact in geometry.contacts:
         a, b = int(world.owners[contact.a]), TABLE if contact.b == TABLE else int(world.owners[contact.b])
         if contact.normal[2] < -0.7:
             carriers.setdefault(b, set()).add(a)
@@ -212,7 +214,7 @@ def check_standing(world: Assembly, rule: str) -> None:
                 f"table is at z = {world.ground:g}). Move it down, or leave it out."
             )
     if rule == "rigid":
-        standing = world.stability().standing(present)
+        standing = geometry.stability.standing(present)
         if not standing.stands:
             falling = ", ".join(world.in_mask(standing.moving))
             raise AssemblyError(
@@ -223,14 +225,12 @@ def check_standing(world: Assembly, rule: str) -> None:
 
 def check_overlaps(world: Assembly) -> None:
     """Refuse boxes of different pieces that overlap by more than the touching tolerance."""
-    touch = world.touch
-    boxes = {i for i, b in enumerate(world.bodies) if isinstance(b.shape, Box)}
-    for a, b in near_pairs(world.body_bounds, world.owners, -touch):
-        if a in boxes and b in boxes and collision.collide(
-            collision.shape_object(world.bodies[a].shape, world.X_WB[a], -touch / 2),
-            collision.shape_object(world.bodies[b].shape, world.X_WB[b], -touch / 2),
-        ):
+    bounds, sizes, shrink = world.body_bounds, world.bodies.box_sizes, world.touch
+    near = overlapping_pairs(bounds[:, 0] + shrink, bounds[:, 1] - shrink, world.owners)
+    for a, b in near[world.bodies.is_box[near].all(axis=1)]:
+        first, second = (collision.box_object(sizes[i] - shrink, world.X_WB[i]) for i in (a, b))
+        if collision.collide(first, second):
             raise AssemblyError(
                 f"Pieces {world.names[world.owners[a]]!r} and {world.names[world.owners[b]]!r} overlap by more than "
-                f"{touch:g}; expected pieces that at most touch. Move one of them."
+                f"{shrink:g}; expected pieces that at most touch. Move one of them."
             )

@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from domains.scrabble_drawing import tile_face
-from neurosym.geometry.assembly import Assembly, boxes_part
+from neurosym.geometry.assembly import Assembly
+from neurosym.geometry.shapes import boxes_part
 from neurosym.planning.staging import Staging, building
 
 #: A tile: its edges, and from the middle of one slot to that of the next (edges of a tile).

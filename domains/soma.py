@@ -17,6 +17,7 @@ from domains.soma_demonstrations import check_seed, demonstrate, picture_seed
 from domains.soma_pieces import LETTERS, Cell, solutions
 from neurosym.errors import AssemblyError, InputError, UnknownNameError
 from neurosym.geometry.assembly import Assembly
+from neurosym.geometry.queries import AssemblyGeometry
 from neurosym.language import Action, Domain, Fluent, Problem, Simulation, Type, predicates
 from neurosym.language.demonstrations import Demonstrations
 from neurosym.language.problem import as_names
@@ -161,7 +162,8 @@ class SomaFamily(ProblemFamily):
         check_overlaps(assembly)
         if collapse != "rigid":
             check_cubes(assembly, collapse)
-        check_standing(assembly, collapse)
+        geometry = AssemblyGeometry(assembly)
+        check_standing(geometry, collapse)
         # No simulation judges `strict`: what is left over a removed cube need not move.
         simulation = None
         if collapse != "strict":
@@ -169,7 +171,7 @@ class SomaFamily(ProblemFamily):
             simulation = Simulation(bodies, {n: n for n in assembly.names}, gone)
 
         return DOMAINS[collapse].problem(
-            world=assembly,
+            world=geometry,
             objects={piece: assembly.names},
             init=[present(n) for n in assembly.names if n not in gone],
             goal=[~present(n) for n in assembly.names],

@@ -10,7 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from neurosym.errors import AssemblyError, UnknownNameError
-from neurosym.geometry.assembly import Assembly, boxes_part
+from neurosym.geometry.assembly import Assembly
+from neurosym.geometry.queries import AssemblyGeometry
+from neurosym.geometry.shapes import boxes_part
 
 Array = NDArray[np.float64]
 #: What makes blocks interchangeable: a colour and a size (width along x, depth along y, height).
@@ -68,13 +70,14 @@ class ReferenceTower:
         levels: names of the blocks that the reference is made of, from the bottom up.
         offsets: float64 (n_levels, 2): how far each level's middle lies from the plumb line, along x and y.
         frame: height of the space that pictures show; None is the height of the tower.
+        tabulate: whether towers of one shape share what is known of their geometry; otherwise all is asked anew.
     """
 
     blocks: tuple[Block, ...]
     levels: tuple[str, ...]
     offsets: Array
     frame: float | None = None
-    _afresh: bool = field(default=False, repr=False)
+    tabulate: bool = field(default=True, repr=False)
 
     @classmethod
     def of(
@@ -127,18 +130,20 @@ class ReferenceTower:
         return tuple(colour for colour, _ in self.reference)
 
     @cached_property
-    def assembly(self) -> Assembly:
-        """The finished tower on the table at z = 0, its parts called level 1, level 2, ... from the bottom up.
-
-        Towers of one shape share it, and with it what is known of their geometry.
-        """
+    def geometry(self) -> AssemblyGeometry:
+        """The finished tower on the table at z = 0, its parts called level 1, level 2, ... from the bottom up."""
         sizes = tuple(size for _, size in self.reference)
-        offsets = tuple((float(x), float(y)) for x, y in self.offsets)
-        return _stack(sizes, offsets).afresh() if self._afresh else _stack(sizes, offsets)
+        shared = _stack(sizes, tuple((float(x), float(y)) for x, y in self.offsets))
+        return shared if self.tabulate else shared.anew()
+
+    @property
+    def assembly(self) -> Assembly:
+        """The same as data."""
+        return self.geometry.assembly
 
     def falling(self, height: int) -> tuple[int, ...]:
         """Which levels (from 0) would fall when the lowest `height` stood by themselves; none: they stand."""
-        answer = self.assembly.stability().standing((1 << height) - 1)
+        answer = self.geometry.stability.standing((1 << height) - 1)
         return () if answer.stands else tuple(i for i in range(height) if answer.moving >> i & 1)
 
     def built(self, order: Sequence[str]) -> Assembly:
@@ -161,17 +166,17 @@ class ReferenceTower:
             top += size[2]
         return Assembly(tuple(parts), table=0.0)
 
-    def afresh(self) -> ReferenceTower:
+    def anew(self) -> ReferenceTower:
         """The same tower with nothing remembered: every question is asked anew."""
-        return replace(self, _afresh=True)
+        return replace(self, tabulate=False)
 
 
 @lru_cache(maxsize=4096)
-def _stack(sizes: tuple[tuple[float, float, float], ...], offsets: tuple[tuple[float, float], ...]) -> Assembly:
+def _stack(sizes: tuple[tuple[float, float, float], ...], offsets: tuple[tuple[float, float], ...]) -> AssemblyGeometry:
     parts, top = [], 0.0
     for i, (size, (x, y)) in enumerate(zip(sizes, offsets), 1):
         X = np.eye(4)
         X[:3, 3] = x, y, top + size[2] / 2
         parts.append(boxes_part(f"level {i}", np.zeros((1, 3)), np.array(size), X))
         top += size[2]
-    return Assembly(tuple(parts), table=0.0)
+    return AssemblyGeometry(Assembly(tuple(parts), table=0.0))

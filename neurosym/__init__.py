@@ -34,6 +34,7 @@ _HOMES = {
     "neurosym.language.demonstrations": ("Demonstrations",),
     "neurosym.language.problem_family": ("ProblemFamily",),
     "neurosym.geometry.assembly": ("Assembly",),
+    "neurosym.geometry.queries": ("AssemblyGeometry",),
     "neurosym.language": (
         "Action",
         "Atom",
@@ -95,6 +96,7 @@ if TYPE_CHECKING:
         UnknownNameError as UnknownNameError,
     )
     from neurosym.geometry.assembly import Assembly as Assembly
+    from neurosym.geometry.queries import AssemblyGeometry as AssemblyGeometry
     from neurosym.language import Action as Action
     from neurosym.language import Atom as Atom
     from neurosym.language import Derived as Derived

@@ -98,7 +98,7 @@ def as_meshes(assembly):
     for i, part in enumerate(assembly.parts):
         mesh = outer(assembly, i)
         parts.append(Part(part.name, (Body(Mesh(mesh.vertices.copy(), mesh.faces.copy()), np.eye(4)),), np.eye(4)))
-    return dataclasses.replace(assembly, parts=tuple(parts), _cache={})
+    return dataclasses.replace(assembly, parts=tuple(parts))
 
 
 def outer(assembly, part):
@@ -374,7 +374,7 @@ def test_no_split_is_a_mistake_without_gravity(parts, fixed):
 def test_orders_under_gravity_agree_with_all_permutations(parts, held):
     problem = made(parts, held=held)
     world = problem.world
-    graph, stability = world.blocking(), world.stability()
+    graph, stability = problem.geometry.blocking(), problem.geometry.stability
 
     def works(order):
         there = (1 << len(world)) - 1
@@ -417,7 +417,7 @@ def turned(assembly, rotation, shift, scale=1.0):
         parts.append(Part(part.name, tuple(bodies), X))
     motion = np.eye(4)
     motion[:3, :3], motion[:3, 3] = rotation, shift
-    return dataclasses.replace(assembly, parts=tuple(parts), _cache={}).transformed(motion)
+    return dataclasses.replace(assembly, parts=tuple(parts)).transformed(motion)
 
 
 ROTATIONS = [
@@ -461,7 +461,7 @@ def test_renaming_and_reordering_parts_relabels_the_verdicts(parts, order):
 def test_soma_through_meshes_is_soma_through_cells(number):
     cells = Assembly.from_cells(ns.load_domain("soma").solutions()[number])
     meshes = as_meshes(cells)
-    assert not meshes.all_boxes
+    assert not meshes.bodies.all_boxes
     for options in ({"gravity": False}, {}):
         assert verdicts(meshes, **options) == verdicts(cells, **options)
     for options in ({"gravity": False}, {}):

@@ -12,8 +12,10 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 import neurosym as ns
-from neurosym.geometry.blocking.sweep import exits_along, triangles_block
+from neurosym.geometry.blocking.sweep import Sweeps
 from neurosym.geometry.contact.contacts import TABLE
+from neurosym.geometry.contact.surfaces import BodySurfaces
+from neurosym.geometry.queries import AssemblyGeometry
 from neurosym.support.bitsets import bits
 
 AXES = np.concatenate([np.eye(3), -np.eye(3)])
@@ -74,7 +76,7 @@ def test_free_on_all_240_cubes_equals_the_exact_answer():
     wrong = asked = 0
     for cells in ns.load_domain("soma").solutions():
         assembly = ns.Assembly.from_cells(cells)
-        graph = assembly.blocking(AXES)
+        graph = AssemblyGeometry(assembly).blocking(AXES)
         everything = (1 << len(assembly)) - 1
         for (i, name), (d, direction) in itertools.product(enumerate(cells), enumerate(AXES)):
             found = set(assembly.in_mask(graph.blockers(i, d, everything)))
@@ -88,7 +90,8 @@ def test_free_on_all_240_cubes_equals_the_exact_answer():
 @given(packings(), st.floats(0, 360), st.tuples(*[st.floats(-50, 50)] * 3))
 def test_blocking_goes_along_with_a_rigid_motion(cells, degrees, shift):
     X = motion(degrees, "zyx"[int(degrees) % 3], shift)
-    still, moved = ns.Assembly.from_cells(cells), ns.Assembly.from_cells(cells).transformed(X)
+    assembly = ns.Assembly.from_cells(cells)
+    still, moved = AssemblyGeometry(assembly), AssemblyGeometry(assembly.transformed(X))
     assert still.blocking(AXES).by_part == moved.blocking(AXES @ X[:3, :3].T).by_part
 
 
@@ -96,28 +99,22 @@ def test_blocking_goes_along_with_a_rigid_motion(cells, degrees, shift):
 @given(packings())
 def test_boxes_triangles_and_steps_agree(cells):
     assembly = ns.Assembly.from_cells(cells, size=2.5)
-    graph = assembly.blocking(AXES)
-    owners = assembly.owners
+    geometry, sweeps = AssemblyGeometry(assembly), Sweeps(assembly, BodySurfaces(assembly.bodies))
+    graph, owners = geometry.blocking(AXES), assembly.owners
     for d, direction in enumerate(AXES):
         for i in range(len(assembly)):
-            others = [j for j in range(len(assembly)) if j != i]
-            swept = set(bits(graph.by_part[d][i]))
-            assert set(exits_along(assembly, i, direction, others)) == swept
-            by_triangles = {
-                j
-                for j in others
-                for a in np.flatnonzero(owners == i)
-                for b in np.flatnonzero(owners == j)
-                if triangles_block(assembly, int(a), int(b), direction)
-            }
-            assert by_triangles == swept
+            swept = graph.by_part[d][i]
+            assert geometry.hits_along(i, direction, ((1 << len(assembly)) - 1) & ~(1 << i)) == swept
+            own, others = np.meshgrid(np.flatnonzero(owners == i), np.flatnonzero(owners != i))
+            pairs = np.stack([own.ravel(), others.ravel()], axis=1)
+            assert set(owners[pairs[sweeps.triangles_hit(pairs, direction), 1]]) == set(bits(swept))
 
 
 @settings(max_examples=25, deadline=None)
 @given(packings())
 def test_blocking_reverses_with_the_direction(cells):
     """If a hits b going one way, b hits a going the other."""
-    graph = ns.Assembly.from_cells(cells).blocking(AXES)
+    graph = AssemblyGeometry(ns.Assembly.from_cells(cells)).blocking(AXES)
     for d in range(3):
         for i, j in itertools.permutations(range(len(cells)), 2):
             assert bool(graph.by_part[d][i] >> j & 1) == bool(graph.by_part[d + 3][j] >> i & 1)
@@ -131,11 +128,12 @@ def test_meshes_of_cubes_become_the_same_boxes(cells, degrees, random):
     random.shuffle(names)
     meshes = as_meshes({n: cells[n] for n in names}, X)
     assembly = ns.Assembly.from_meshes(meshes)
-    assert assembly.all_boxes
+    assert assembly.bodies.all_boxes
     reference = ns.Assembly.from_cells({n: cells[n] for n in names}).transformed(X)
     assert len(assembly.bodies) == len(reference.bodies)
     directions = AXES @ X[:3, :3].T
-    assert assembly.blocking(directions).by_part == reference.blocking(directions).by_part
+    ours, theirs = AssemblyGeometry(assembly), AssemblyGeometry(reference)
+    assert ours.blocking(directions).by_part == theirs.blocking(directions).by_part
 
 
 def test_general_meshes_are_answered_by_their_triangles():
@@ -144,8 +142,8 @@ def test_general_meshes_are_answered_by_their_triangles():
     ball = trimesh.creation.icosphere(radius=0.5)
     ball.apply_translation((0, 0, 5))
     assembly = ns.Assembly.from_meshes({"ring": ring, "pin": pin, "ball": ball})
-    assert not assembly.all_boxes
-    graph = assembly.blocking(np.array([[0, 0, 1.0], [0, 0, -1.0], [1.0, 0, 0]]))
+    assert not assembly.bodies.all_boxes
+    graph = AssemblyGeometry(assembly).blocking(np.array([[0, 0, 1.0], [0, 0, -1.0], [1.0, 0, 0]]))
     every = 0b111
     assert assembly.in_mask(graph.blockers(1, 0, every)) == ("ball",)
     assert assembly.in_mask(graph.blockers(1, 1, every)) == ()
@@ -162,23 +160,21 @@ def test_a_box_in_a_hollow_mesh_is_caught():
     assembly = ns.Assembly.from_meshes(
         {"shell": trimesh.util.concatenate([shell, hole]), "ball": trimesh.creation.icosphere(radius=0.9)}
     )
-    graph = assembly.blocking(AXES)
+    graph = AssemblyGeometry(assembly).blocking(AXES)
     assert graph.free_directions(1, 0b11, table=False) == []
 
 
 def test_the_filter_leaves_few_pairs_for_the_exact_test():
     assembly = ns.Assembly.from_cells(ns.load_domain("soma").solutions()[0])
-    graph = assembly.blocking(AXES)
+    graph = AssemblyGeometry(assembly).blocking(AXES)
     # Of 27 x 26 x 6 ordered pairs of cubes only those in one column can be hit.
     assert graph.queries <= 27 * 6
-    assert ns.Assembly.from_cells(ns.load_domain("soma").solutions()[0]).transformed(motion(30)).blocking().queries <= (
-        27 * 6
-    )
+    assert AssemblyGeometry(assembly.transformed(motion(30))).blocking().queries <= 27 * 6
 
 
 def test_the_graph_exports_to_networkx():
     assembly = ns.Assembly.from_cells({"low": [(0, 0, 0)], "high": [(0, 0, 1)], "beside": [(1, 0, 0)]})
-    graph = assembly.blocking(AXES)
+    graph = AssemblyGeometry(assembly).blocking(AXES)
     up = graph.graph(2)
     assert set(up.edges) == {("low", "high")}
     assert up.graph["direction"] == (0.0, 0.0, 1.0)
@@ -191,7 +187,7 @@ def test_contacts_of_boxes_have_points_normals_and_areas(degrees):
     cells = {"a": [(0, 0, 0), (1, 0, 0)], "b": [(0, 0, 1)], "c": [(1, 1, 0)]}
     assembly = ns.Assembly.from_cells(cells, size=2.0).transformed(motion(degrees))
     by_parts = {}
-    for contact in assembly.contacts():
+    for contact in AssemblyGeometry(assembly).contacts:
         other = "table" if contact.b == TABLE else assembly.names[assembly.owners[contact.b]]
         by_parts.setdefault((assembly.names[assembly.owners[contact.a]], other), []).append(contact)
     assert set(by_parts) == {("a", "b"), ("a", "c"), ("a", "table"), ("c", "table")}
@@ -208,7 +204,7 @@ def test_contacts_of_boxes_have_points_normals_and_areas(degrees):
 
 def test_boxes_that_meet_in_an_edge_or_a_corner_do_not_touch():
     assembly = ns.Assembly.from_cells({"a": [(0, 0, 0)], "b": [(1, 1, 0)], "c": [(2, 2, 1)]})
-    assert all(c.b == TABLE for c in assembly.contacts())
+    assert all(c.b == TABLE for c in AssemblyGeometry(assembly).contacts)
 
 
 def test_contacts_of_meshes_equal_those_of_boxes():
@@ -219,10 +215,11 @@ def test_contacts_of_meshes_equal_those_of_boxes():
     top = wedge.copy()
     top.apply_translation((0, 0, 1))
     assembly = ns.Assembly.from_meshes({"low": wedge, "high": top})
-    (contact,) = [c for c in assembly.contacts() if c.b != TABLE]
+    contacts = AssemblyGeometry(assembly).contacts
+    (contact,) = [c for c in contacts if c.b != TABLE]
     assert contact.area == pytest.approx(2.0)
     np.testing.assert_allclose(contact.normal, [0, 0, 1], atol=1e-9)
-    (table,) = [c for c in assembly.contacts() if c.b == TABLE]
+    (table,) = [c for c in contacts if c.b == TABLE]
     assert table.area == pytest.approx(2.0)
 
 
@@ -230,18 +227,18 @@ def test_contacts_of_meshes_equal_those_of_boxes():
 @given(packings(), st.floats(0, 360))
 def test_standing_does_not_change_with_an_upright_motion(cells, degrees):
     # A piece on exactly its edge may go either way; patches are shrunk, so that it does not here.
-    still = ns.Assembly.from_cells(cells)
-    moved = still.transformed(motion(degrees, "z", (5, 6, -7)))
+    assembly = ns.Assembly.from_cells(cells)
+    moved = AssemblyGeometry(assembly.transformed(motion(degrees, "z", (5, 6, -7)))).stability
+    still = AssemblyGeometry(assembly).stability
     for subset in range(1, 1 << min(len(cells), 4)):
-        a, b = still.stability().standing(subset), moved.stability().standing(subset)
-        assert a.stands == b.stands
+        assert still.standing(subset).stands == moved.standing(subset).stands
 
 
 def test_a_tower_stands_and_an_overhang_falls():
     assembly = ns.Assembly.from_cells(
         {"base": [(0, 0, 0)], "beam": [(0, 0, 1), (1, 0, 1), (2, 0, 1)], "weight": [(0, 0, 2)], "prop": [(2, 0, 0)]}
     )
-    stability = assembly.stability()
+    stability = AssemblyGeometry(assembly).stability
     assert stability.standing(assembly.mask(assembly.names)).stands
     assert not stability.standing(assembly.mask(["base", "beam"])).stands
     assert assembly.in_mask(stability.standing(assembly.mask(["base", "beam"])).moving) == ("beam",)
@@ -254,7 +251,7 @@ def test_a_tower_stands_and_an_overhang_falls():
 @given(packings(), st.data())
 def test_a_fall_stays_a_fall_while_the_moving_parts_are_there(cells, data):
     assembly = ns.Assembly.from_cells(cells)
-    stability = assembly.stability()
+    stability = AssemblyGeometry(assembly).stability
     subset = data.draw(st.integers(1, (1 << len(cells)) - 1))
     answer = stability.standing(subset)
     if not answer.stands:
@@ -276,12 +273,12 @@ def test_friction_holds_a_wedge_only_when_there_is_enough():
     block.apply_translation((2, 1, 2 * slope))
     for friction, stays in ((0.3, False), (0.6, True)):
         assembly = ns.Assembly.from_meshes({"ramp": ramp, "block": block}, friction=friction)
-        assert assembly.stability().standing(0b11).stands is stays
+        assert AssemblyGeometry(assembly).stability.standing(0b11).stands is stays
 
 
 def test_friction_beyond_what_numbers_can_tell_apart_is_answered():
     cells = {"low": [(0, 0, 0)], "high": [(0, 0, 1)], "side": [(1, 0, 1)]}
-    stability = ns.Assembly.from_cells(cells, friction=1e9).stability()
+    stability = AssemblyGeometry(ns.Assembly.from_cells(cells, friction=1e9)).stability
     assert stability.standing(0b011).stands
     assert not stability.standing(0b111).stands
 
@@ -307,7 +304,7 @@ def test_friction_beyond_what_numbers_can_tell_apart_is_answered():
         (lambda: ns.Assembly.from_cells({"a": [(0, 0, 0)]}).transformed(np.eye(3)), "rigid motion"),
         (lambda: ns.Assembly.from_cells({"a": [(0, 0, 0)]}).transformed(2 * np.eye(4)), "rigid motion"),
         (lambda: ns.Assembly.from_cells({"a": [(0, 0, 0)]})["b"], "name of a part"),
-        (lambda: ns.Assembly.from_cells({"a": [(0, 0, 0)]}).blocking([[0, 0, 0]]), "non-zero"),
+        (lambda: AssemblyGeometry(ns.Assembly.from_cells({"a": [(0, 0, 0)]})).blocking([[0, 0, 0]]), "non-zero"),
     ],
 )
 def test_bad_geometry_is_refused_with_the_reason(make, says):
@@ -331,7 +328,7 @@ def test_friction_is_as_stated_in_every_direction(degrees, side):
     turn = motion(degrees)
     meshes = {"ramp": ramp.apply_transform(turn), "block": block.apply_transform(turn)}
     assembly = ns.Assembly.from_meshes(meshes, friction=friction)
-    assert assembly.stability().standing(0b11).stands is (side < 0)
+    assert AssemblyGeometry(assembly).stability.standing(0b11).stands is (side < 0)
 
 
 def boundary_mesh(cells, X):
@@ -371,8 +368,8 @@ def test_meshes_far_from_the_origin_touch_as_they_should(scale, degrees, shift):
     for number in (17, 100):
         cells = ns.load_domain("soma").solutions()[number]
         assembly = ns.Assembly.from_meshes({name: boundary_mesh(own, X) for name, own in cells.items()})
-        areas = [c.area / scale**2 for c in assembly.contacts()]
-        assert len(areas) == len(ns.Assembly.from_cells(cells).contacts())
+        areas = [c.area / scale**2 for c in AssemblyGeometry(assembly).contacts]
+        assert len(areas) == len(AssemblyGeometry(ns.Assembly.from_cells(cells)).contacts)
         np.testing.assert_allclose(areas, 1.0, rtol=1e-6)
 
 
@@ -387,4 +384,4 @@ def test_large_boxes_stay_single_boxes():
     }
     assembly = ns.Assembly.from_meshes(meshes)
     assert len(assembly.bodies) == 5
-    assert assembly.stability().standing(0b11111).stands
+    assert AssemblyGeometry(assembly).stability.standing(0b11111).stands

@@ -17,6 +17,7 @@ import neurosym as ns
 from neurosym.geometry.assembly import NO_TABLE
 from neurosym.geometry.blocking.directions import directions_for
 from neurosym.geometry.contact.contacts import TABLE
+from neurosym.geometry.queries import AssemblyGeometry
 from neurosym.support.bitsets import bits
 
 DATA = Path(__file__).parents[2] / "shared" / "data"
@@ -73,7 +74,7 @@ def test_answers_are_those_of_the_linear_program(local, cells, data):
         if local:
             patch.setattr(module, "SMALL", 0)
         assembly = ns.Assembly.from_cells(cells)
-        quick, slow = assembly.stability(), assembly.afresh().stability()
+        quick, slow = AssemblyGeometry(assembly).stability, AssemblyGeometry(assembly, tabulate=False).stability
         subset = (1 << len(cells)) - 1
         for part in data.draw(st.permutations(range(len(cells)))):
             held = data.draw(st.sampled_from([0, 0, 1 << data.draw(st.integers(0, len(cells) - 1))]))
@@ -90,7 +91,7 @@ def test_answers_are_those_of_the_linear_program(local, cells, data):
 @settings(max_examples=15, deadline=None)
 @given(stacks, st.integers(0, 2))
 def test_hands_are_found_exactly_where_some_set_helps(cells, most):
-    stability = ns.Assembly.from_cells(cells).stability()
+    stability = AssemblyGeometry(ns.Assembly.from_cells(cells)).stability
     everything = (1 << len(cells)) - 1
     subset = everything & ~1
     answer = stability.standing_when_held(subset, most)
@@ -107,7 +108,7 @@ def test_hands_are_found_exactly_where_some_set_helps(cells, most):
 @pytest.mark.parametrize("friction", [0.5, 0.8])
 def test_an_arch_stands_between_its_springers_until_one_block_goes(friction):
     assembly = arch(friction=friction)
-    stability, full = assembly.stability(), (1 << 9) - 1
+    stability, full = AssemblyGeometry(assembly).stability, (1 << 9) - 1
     assert stability.standing(full).stands
     assert not stability.standing(full & ~assembly.fixed_mask).stands
     for block in range(1, 8):
@@ -136,13 +137,14 @@ def test_verdicts_do_not_depend_on_pose_scale_or_names(turns, shift, scale, name
         return sum(1 << k for k, old in enumerate(place) if mask >> old & 1)
 
     directions = np.concatenate([AXES, [[0.6, 0, 0.8], [0.0, 0.6, 0.8]]])
-    before, after = still.blocking(directions), moved.blocking(directions @ X[:3, :3].T)
+    first, second = AssemblyGeometry(still), AssemblyGeometry(moved)
+    before, after = first.blocking(directions), second.blocking(directions @ X[:3, :3].T)
     full = (1 << 7) - 1
     for d in range(len(directions)):
         assert [after.by_part[d][k] for k in range(7)] == [renamed(before.by_part[d][old]) for old in place]
     for block in range(7):
-        a = still.stability().standing(full & ~(1 << block))
-        b = moved.stability().standing(full & ~(1 << place.index(block)))
+        a = first.stability.standing(full & ~(1 << block))
+        b = second.stability.standing(full & ~(1 << place.index(block)))
         assert (b.stands, b.moving) == (a.stands, renamed(a.moving))
 
 
@@ -151,22 +153,24 @@ def test_light_parts_count_and_heavy_ones_may_rest_on_them():
     parts = ns.Assembly.from_cells(cells).parts
     density = {"heavy": 1e4, "shim": 1e-2, "floating": 1e-2, "far": 1e4}
     assembly = ns.Assembly(tuple(ns.geometry.shapes.Part(p.name, p.bodies, p.X_WP, density[p.name]) for p in parts))
-    answer = assembly.stability().standing(0b1111)
+    stability = AssemblyGeometry(assembly).stability
+    answer = stability.standing(0b1111)
     assert assembly.in_mask(answer.moving) == ("floating",)
-    assert assembly.stability().standing(assembly.mask(["heavy", "shim", "far"])).stands
+    assert stability.standing(assembly.mask(["heavy", "shim", "far"])).stands
 
 
 def test_without_a_table_only_what_is_fixed_carries():
     cells = {"base": [(0, 0, 0), (1, 0, 0)], "top": [(0, 0, 1)]}
     floating = ns.Assembly.from_cells(cells, table=NO_TABLE)
-    assert not floating.stability().standing(0b11).stands
-    assert floating.stability().standing(0b11, held=0b01).stands
-    assert floating.with_fixed(["base"]).stability().standing(0b11).stands
-    graph = floating.blocking()
+    geometry = AssemblyGeometry(floating)
+    assert not geometry.stability.standing(0b11).stands
+    assert geometry.stability.standing(0b11, held=0b01).stands
+    assert AssemblyGeometry(floating.with_fixed(["base"])).stability.standing(0b11).stands
+    graph = geometry.blocking()
     assert not graph.into_table.any()
     assert [graph.describe(d) for d in graph.free_directions(0, 0b11)] == ["+y", "+x", "-x", "-y", "-z"]
     assert floating.transformed(rigid((90, 0, 0))).ground == NO_TABLE
-    assert floating.with_table(0.0).stability().standing(0b11).stands
+    assert AssemblyGeometry(floating.with_table(0.0)).stability.standing(0b11).stands
 
 
 # -- directions ---------------------------------------------------------------------------------------------------
@@ -203,9 +207,10 @@ def test_a_slanted_key_leaves_only_as_its_contacts_let_it():
         meshes[f"wall{k}"] = side.apply_transform(X)
     assembly = ns.Assembly.from_meshes(meshes, table=NO_TABLE)
     full = (1 << len(assembly)) - 1
-    world = assembly.blocking(AXES)
+    geometry = AssemblyGeometry(assembly)
+    world = geometry.blocking(AXES)
     assert world.free_directions(0, full) == []
-    own = assembly.blocking("contacts")
+    own = geometry.blocking("contacts")
     free = own.directions[own.free_directions(0, full)]
     assert len(free) == 2
     np.testing.assert_allclose(np.abs(free @ X[:3, 2]), 1, atol=1e-9)
@@ -220,7 +225,7 @@ def test_groups_are_the_smallest_that_leave(cells, data):
     assembly = ns.Assembly.from_cells(cells, table=NO_TABLE)
     fixed = data.draw(st.sampled_from([(), (next(iter(cells)),)]))
     assembly = assembly.with_fixed(fixed)
-    graph = assembly.blocking(AXES)
+    graph = AssemblyGeometry(assembly).blocking(AXES)
     among = data.draw(st.integers(1, (1 << len(cells)) - 1))
     for d in range(6):
         leaving = [
@@ -244,7 +249,7 @@ def test_groups_are_the_smallest_that_leave(cells, data):
 
 def test_nothing_moves_into_the_table():
     assembly = ns.Assembly.from_cells({"a": [(0, 0, 0)], "b": [(0, 0, 1)]})
-    graph = assembly.blocking("-z,+z")
+    graph = AssemblyGeometry(assembly).blocking("-z,+z")
     assert graph.leaving_group(0, 0, 0b11) == 0
     assert graph.components(0, 0b11) == []
     assert graph.leaving_group(0, 0, 0b11, table=False) == 0b01
@@ -255,10 +260,10 @@ def test_nothing_moves_into_the_table():
 
 
 def test_opposite_directions_are_asked_once_and_agree_with_asking_twice():
-    assembly = arch(7)
+    geometry = AssemblyGeometry(arch(7))
     directions = np.array([[0.6, 0.0, 0.8], [0, 1.0, 0], [0.0, 0.6, 0.8]])
-    both = assembly.blocking(np.concatenate([directions, -directions]))
-    assert both.by_part[3:] == assembly.blocking(-directions).by_part
+    both = geometry.blocking(np.concatenate([directions, -directions]))
+    assert both.by_part[3:] == geometry.blocking(-directions).by_part
 
 
 @pytest.mark.parametrize("depth", [0.0, 0.02, 0.04, 0.2])
@@ -267,13 +272,14 @@ def test_parts_that_overlap_a_little_touch_and_do_not_block(depth):
     high.apply_transform(rigid((0, 0, 20)))
     high.apply_translation((0, 0, 1.0015 - depth))
     assembly = ns.Assembly.from_meshes({"low": low, "high": high})
-    graph = assembly.blocking(np.array([[0, 0, 1.0], [1, 0, 0], [0.6, 0, 0.8]]))
-    between = [c for c in assembly.contacts() if c.b != TABLE]
+    geometry = AssemblyGeometry(assembly)
+    graph = geometry.blocking(np.array([[0, 0, 1.0], [1, 0, 0], [0.6, 0, 0.8]]))
+    between = [c for c in geometry.contacts if c.b != TABLE]
     if depth < 0.1:
         assert len(between) == 1
         assert [graph.blockers(1, d, 0b11) for d in range(3)] == [0, 0, 0]
         assert graph.blockers(0, 0, 0b11) == 0b10
-        assert assembly.stability().standing(0b11).stands
+        assert geometry.stability.standing(0b11).stands
     else:
         assert not between
         assert [graph.blockers(1, d, 0b11) for d in range(3)] == [0b01, 0b01, 0b01]
@@ -292,9 +298,9 @@ def test_finer_triangles_give_the_same_answers(times):
     meshes["tip"] = trimesh.creation.icosphere(2, radius=0.3).apply_translation((40, 0, 0))
     assembly = ns.Assembly.from_meshes(meshes)
     directions = AXES @ rigid((12, 31, 7))[:3, :3].T
-    exact = ns.Assembly.from_cells(cells).blocking(AXES)
+    exact = AssemblyGeometry(ns.Assembly.from_cells(cells)).blocking(AXES)
     among = 0b111
-    graph = assembly.blocking(directions)
+    graph = AssemblyGeometry(assembly).blocking(directions)
     assert [[m & among for m in row[:3]] for row in graph.by_part] == exact.by_part
 
 
@@ -303,8 +309,9 @@ def test_round_parts_touch_though_no_facets_lie_in_one_plane():
     pin = trimesh.creation.cylinder(radius=1.0, height=3.0, sections=48)
     pair = [m.apply_transform(rigid((90, 0, 0), (0, 0, 2.0))) for m in (hole, pin)]
     assembly = ns.Assembly.from_meshes({"ring": pair[0], "pin": pair[1]}, table=NO_TABLE).with_fixed(["ring"])
-    assert {(c.a, c.b) for c in assembly.contacts()} == {(0, 1)}
-    assert assembly.stability().standing(0b11).stands
+    geometry = AssemblyGeometry(assembly)
+    assert {(c.a, c.b) for c in geometry.contacts} == {(0, 1)}
+    assert geometry.stability.standing(0b11).stands
 
 
 # -- structures by others -----------------------------------------------------------------------------------------
@@ -320,7 +327,7 @@ def structure(name: str) -> ns.Assembly:
 
 def test_the_arch_of_thirty_stands_and_no_block_can_go():
     assembly = structure("arch")
-    stability, full = assembly.stability(), (1 << 30) - 1
+    stability, full = AssemblyGeometry(assembly).stability, (1 << 30) - 1
     assert stability.standing(full).stands
     assert not any(stability.standing(full & ~(1 << k)).stands for k in range(1, 29))
     assert stability.standing_when_held(full & ~0b10, 1).stands
@@ -328,7 +335,8 @@ def test_the_arch_of_thirty_stands_and_no_block_can_go():
 
 def test_the_wall_comes_apart_from_above():
     assembly = structure("wall")
-    graph, stability = assembly.blocking(), assembly.stability()
+    geometry = AssemblyGeometry(assembly)
+    graph, stability = geometry.blocking(), geometry.stability
     there = (1 << len(assembly)) - 1
     down = np.argsort(-assembly.body_bounds[:, 1, 2])
     while left := [p for p in map(int, down) if there & ~assembly.fixed_mask & 1 << p]:
@@ -338,9 +346,10 @@ def test_the_wall_comes_apart_from_above():
 
 def test_a_dome_of_527_stands_on_its_fixed_ring():
     assembly = structure("dome")
-    stability, full = assembly.stability(), (1 << 527) - 1
+    geometry = AssemblyGeometry(assembly)
+    stability, full = geometry.stability, (1 << 527) - 1
     assert stability.standing(full).stands
-    graph = assembly.blocking("+z")
+    graph = geometry.blocking("+z")
     assert sum(graph.blockers(p, 0, full) == 0 for p in range(527)) == 31
     top = next(p for p in range(527) if graph.blockers(p, 0, full) == 0)
     fallen = stability.standing(full & ~(1 << top))
@@ -357,7 +366,7 @@ def test_newtons_method_converges_on_all_of_a_dome_at_once():
     from neurosym.geometry.stability.equilibrium import QUICK, THOROUGH
 
     assembly = structure("dome")
-    equilibrium, stone = assembly.stability().equilibrium, assembly.index["408"]
+    equilibrium, stone = AssemblyGeometry(assembly).stability.equilibrium, assembly.index["408"]
     loose = np.array([not assembly.fixed_mask >> k & 1 and k != stone for k in range(527)] + [False])
     between = (loose[equilibrium.a] | loose[equilibrium.b]) & (equilibrium.a != stone) & (equilibrium.b != stone)
     parts, corners = np.flatnonzero(loose), np.flatnonzero(between)

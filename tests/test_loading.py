@@ -21,10 +21,12 @@ import neurosym as ns
 from neurosym.geometry.contact import collision
 from neurosym.geometry.contact.overlaps import overlaps
 from neurosym.geometry.mesh import topology, triangles
-from neurosym.geometry.mesh.polygons import triangulate
+from neurosym.geometry.mesh.broad_phase import near_pairs
+from neurosym.geometry.mesh.triangulation import triangulate
+from neurosym.geometry.queries import AssemblyGeometry
 from neurosym.geometry.readers.burrtools import rotations
 from neurosym.geometry.readers.contents import RawMesh
-from neurosym.geometry.readers.health import examine
+from neurosym.geometry.readers.mesh_checks import examine
 from neurosym.geometry.readers.names import distinct
 from neurosym.geometry.shapes import Body, Box, Convex, Part
 from neurosym.geometry.shapes import Mesh as MeshShape
@@ -266,7 +268,7 @@ def test_mating_blocks_that_overlap_slightly_are_taken_for_touching():
     assembly = ns.Assembly.load(DATA / "crossvault")
     (note,) = [n for n in assembly.notes if n.kind == "mating"]
     assert assembly.touch > note.measure > 1e-3 * assembly.smallest_extent
-    assert max(o.depth for o in overlaps(assembly)) == pytest.approx(note.measure)
+    assert max(o.depth for o in overlaps(assembly.bodies)) == pytest.approx(note.measure)
 
 
 # -- names and units ------------------------------------------------------------------------------------------
@@ -448,7 +450,7 @@ def test_a_layer_that_two_prisms_both_claim_is_as_deep_as_it_is(sides, depth, sh
     low, high = prism(sides[0], 1.0, 1.0), prism(sides[1], 0.9, 1.3)
     high = turned(high, Rotation.from_euler("z", spin).as_matrix(), (*shift, 1.15 - depth))
     R = Rotation.random(random_state=seed).as_matrix()
-    (found,) = overlaps(assembled(turned(low, R), turned(high, R)))
+    (found,) = overlaps(assembled(turned(low, R), turned(high, R)).bodies)
     assert found.depth == pytest.approx(depth, rel=1e-6)
 
 
@@ -462,7 +464,7 @@ def test_boxes_overlap_by_no_more_than_the_shortest_way_apart_and_never_by_nothi
     first, second = np.array(sizes[:3]), np.array(sizes[3:])
     apart = (first + second) / 2 - np.abs(shift)
     R = Rotation.random(random_state=seed).as_matrix()
-    found = overlaps(assembled(turned(box(first), R), turned(box(second, at=shift), R)))
+    found = overlaps(assembled(turned(box(first), R), turned(box(second, at=shift), R)).bodies)
     if apart.min() < 1e-3:
         assert all(o.depth <= max(apart.min(), 0) + 1e-9 for o in found)
     else:
@@ -480,20 +482,21 @@ def test_a_peg_in_its_hole_only_touches(sides: int, slack: float, lift: float, s
     R = Rotation.random(random_state=seed).as_matrix()
     peg = prism(sides, 0.5 - slack, 3.0)
     hole = (np.array(ring.vertices), np.array(ring.faces))
-    assert not overlaps(assembled(turned(hole, R), turned(peg, R, R @ [0, 0, lift])))
+    assert not overlaps(assembled(turned(hole, R), turned(peg, R, R @ [0, 0, lift])).bodies)
 
 
 @settings(deadline=None, max_examples=15)
 @given(sides=st.integers(6, 60), tight=st.floats(2e-3, 0.05))
 def test_a_peg_too_wide_for_its_hole_overlaps_by_the_difference(sides: int, tight: float):
     ring = trimesh.creation.annulus(0.5, 1.0, 1.0, sections=sides)
-    (found,) = overlaps(assembled((np.array(ring.vertices), np.array(ring.faces)), prism(sides, 0.5 + tight, 3.0)))
+    pair = assembled((np.array(ring.vertices), np.array(ring.faces)), prism(sides, 0.5 + tight, 3.0))
+    (found,) = overlaps(pair.bodies)
     flats = tight * np.cos(np.pi / sides)
     assert flats * (1 - 1e-6) <= found.depth <= tight * 1.45
 
 
 def test_two_copies_in_one_place_overlap_by_their_thickness():
-    (found,) = overlaps(assembled(box((1, 2.03, 3.1)), box((1, 2.03, 3.1))))
+    (found,) = overlaps(assembled(box((1, 2.03, 3.1)), box((1, 2.03, 3.1))).bodies)
     assert found.depth == pytest.approx(1)
 
 
@@ -506,8 +509,8 @@ def test_the_touching_tolerance_follows_the_overlap_and_goes_no_farther(depth: f
     assert depth < assembly.tolerances.touch <= max(0.05, 1.01 * depth)
     assert assembly.notes[0].measure == pytest.approx(depth)
     # Taken for touch: the upper one lies on the lower one, and each can leave the other upwards or sideways.
-    assert len([c for c in assembly.contacts() if c.b >= 0]) == 1
-    graph = assembly.blocking(np.vstack([np.eye(3), -np.eye(3)]))
+    assert len([c for c in AssemblyGeometry(assembly).contacts if c.b >= 0]) == 1
+    graph = AssemblyGeometry(assembly).blocking(np.vstack([np.eye(3), -np.eye(3)]))
     assert [len(graph.free_directions(i, 0b11, table=False)) for i in (0, 1)] == [5, 5]
 
 
@@ -543,10 +546,10 @@ def test_near_pairs_are_those_whose_boxes_meet_with_a_tree_and_without(seed: int
     rng = np.random.default_rng(seed)
     low = [rng.uniform(0, 10, (count, 3)) for _ in range(2)]
     high = [edge + rng.uniform(0, 0.5, (count, 3)) for edge in low]
-    found = triangles.near_pairs((low[0], high[0]), (low[1], high[1]), 10**6)
+    found = near_pairs((low[0], high[0]), (low[1], high[1]), 10**6)
     expected = (low[0][:, None] <= high[1]).all(axis=2) & (low[1] <= high[0][:, None]).all(axis=2)
     assert {tuple(p) for p in found.tolist()} == {tuple(p) for p in np.argwhere(expected).tolist()}
-    assert triangles.near_pairs((low[0], high[0]), (low[0], high[0]), count - 1) is None
+    assert near_pairs((low[0], high[0]), (low[0], high[0]), count - 1) is None
 
 
 @settings(deadline=None, max_examples=30)
@@ -630,5 +633,5 @@ def test_cells_and_meshes_of_one_puzzle_load_to_the_same_boxes(tmp_path: Path):
         pieces = [mesh(turned((b.shape.vertices, b.shape.faces), np.eye(3), b.X_PB[:3, 3])) for b in part.bodies]
         trimesh.util.concatenate(pieces).export(tmp_path / f"{part.name}.stl")
     found = ns.Assembly.load(tmp_path, units="mm")
-    assert found.all_boxes
+    assert found.bodies.all_boxes
     assert sorted(map(tuple, found.X_WB[:, :3, 3].round(6))) == sorted(map(tuple, cells.X_WB[:, :3, 3]))

@@ -13,6 +13,7 @@ import neurosym as ns
 from learned_priors import NetworkPrior
 from neurosym.errors import InputError
 from neurosym.geometry.paths.joint_motion import plan_joint_motion
+from neurosym.geometry.queries import AssemblyGeometry
 from neurosym.planning.staging import building, stage
 from neurosym.simulation.client import Client
 from neurosym.simulation.panda import BuildSettings, CellFilm, build_with_panda, starting_places
@@ -100,7 +101,7 @@ def test_the_tower_stands_in_the_order_of_the_plan(number, seed):
         assert X[2, 2] > 0.999
     built = report.built()
     assert built.names == tuple(plan)
-    assert built.stability().standing((1 << len(plan)) - 1).stands
+    assert AssemblyGeometry(built).stability.standing((1 << len(plan)) - 1).stands
 
 
 def test_what_slips_is_reported_and_nothing_is_built_on_it():

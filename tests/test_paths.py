@@ -19,7 +19,8 @@ from neurosym.geometry.paths.clearance import Clearance
 from neurosym.geometry.paths.extraction import Failure, extract
 from neurosym.geometry.paths.grid import cells_of
 from neurosym.geometry.paths.path_check import check_path
-from neurosym.geometry.paths.voxel_moves import Separation, first_separation
+from neurosym.geometry.paths.voxel_search import first_separation
+from neurosym.geometry.paths.voxel_separation import Separation
 from neurosym.geometry.rigid_motions import Interpolation, shifted
 from neurosym.geometry.shapes import Body, Box, Mesh, Part
 from neurosym.geometry.step_motion import StepMotion, Track

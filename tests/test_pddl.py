@@ -261,13 +261,13 @@ def test_refuted_orders_are_no_plans_any_more(tmp_path: Path) -> None:
 
 
 def test_falls_are_true_and_none_is_missed() -> None:
-    world = PROBLEMS["sample 3, gravity"].world
+    world = PROBLEMS["sample 3, gravity"].geometry
     everything = (1 << len(world)) - 1
-    falls = find_falls(world, everything, {k: [0] for k in range(len(world))})
+    falls = find_falls(world.stability, everything, {k: [0] for k in range(len(world))})
     assert falls.complete
     for there in range(1, everything + 1):
         # Every set can be reached here, except through one that falls: what falls must be known, and only that.
-        assert any(f.happens(there) for f in falls.falls) <= (not world.stability().standing(there).stands)
+        assert any(f.happens(there) for f in falls.falls) <= (not world.stability.standing(there).stands)
     assert falls.falls
 
 

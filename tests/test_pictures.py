@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from neurosym.errors import InputError, UnknownNameError
-from neurosym.geometry.assembly import Assembly, Body, Mesh, Part
+from neurosym.geometry.assembly import Assembly
+from neurosym.geometry.shapes import Body, Mesh, Part
 from neurosym.simulation import PALETTE, PictureStudio, cached_pictures, open_clients, render_many, render_views
 from neurosym.simulation.render import CHUNK
 from neurosym.support.disk_cache import cache_folder

@@ -33,13 +33,13 @@ def take_apart(cells, *, pre=None, **options):
 
 
 def ask(predicate, problem, *args):
-    """A predicate's verdict in the initial state of a problem, by its tables and afresh."""
+    """A predicate's verdict in the initial state of a problem, by its tables and asked anew."""
     from neurosym.language.grounding import BitState
 
     ground = problem.ground()
     state = BitState(ground, ground.initial)
-    quick = predicate.function(problem.world, state, *args)
-    slow = predicate.function(problem.world.afresh(), state, *args)
+    quick = predicate.function(problem.geometry, state, *args)
+    slow = predicate.function(problem.geometry.anew(), state, *args)
     assert quick.holds == slow.holds
     assert set(quick.because) == set(slow.because)
     return quick
@@ -129,7 +129,7 @@ def test_putting_together_is_taking_apart_backwards():
         there = state.mask(present, world.names)
         number = world.index[name]
         reachable = graph.free_directions(number, there)
-        stands = world.stability().standing(there | 1 << number)
+        stands = world.stability.standing(there | 1 << number)
         return ns.Verdict(bool(reachable) and stands.stands, (), f"{name} does not fit here yet.")
 
     place = ns.Action("place", p, pre=[~present(p), can_be_put(p)], eff=[present(p)], label="{p}")

@@ -37,7 +37,7 @@ def call(*arguments) -> int:
 
 
 def corners(assembly):
-    return np.concatenate([assembly.body_vertices(i) for i in range(len(assembly.bodies))])
+    return np.concatenate([assembly.bodies.vertices(i) for i in range(len(assembly.bodies))])
 
 
 def red(picture):

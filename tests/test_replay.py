@@ -23,7 +23,7 @@ from scipy.spatial.transform import Rotation
 import neurosym as ns
 from neurosym.cli import main
 from neurosym.errors import InputError, NeurosymError, UnknownNameError
-from neurosym.geometry.assembly import Body, Box, Mesh, Part
+from neurosym.geometry.shapes import Body, Box, Mesh, Part
 from neurosym.geometry.step_motion import StepMotion, Track
 from neurosym.plan_files.reading import read_plan
 from neurosym.planning.staging import Staging, building, stage, staged

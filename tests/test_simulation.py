@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from neurosym.errors import InputError, UnknownNameError
-from neurosym.geometry.assembly import Assembly, Body, Convex, Mesh, Part
+from neurosym.geometry.assembly import Assembly
+from neurosym.geometry.shapes import Body, Convex, Mesh, Part
 from neurosym.language.search_problem import Rejection, Step
 from neurosym.simulation import PhysicsOracle, World, open_clients, stands
 from neurosym.simulation.solids import rigid_bodies

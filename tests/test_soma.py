@@ -17,6 +17,7 @@ import neurosym as ns
 from domains.collapse import RULES
 from domains.soma_demonstrations import habit
 from domains.soma_pieces import LETTERS, PIECES, symmetries, turned
+from neurosym.geometry.queries import AssemblyGeometry
 
 soma = ns.load_domain("soma")
 
@@ -144,7 +145,7 @@ def test_rigid_orders_do_not_depend_on_the_heading():
         for degrees in (0, 17.3, 30, 45):
             X = np.eye(4)
             X[:3, :3] = Rotation.from_euler("z", degrees, degrees=True).as_matrix()
-            stability = ns.Assembly.from_cells(soma.solutions()[number]).transformed(X).stability()
+            stability = AssemblyGeometry(ns.Assembly.from_cells(soma.solutions()[number]).transformed(X)).stability
             answers.append([stability.standing(subset).stands for subset in range(1, 128)])
         assert answers[0] == answers[1] == answers[2] == answers[3]
 
@@ -305,7 +306,7 @@ def test_shapes_that_are_no_cubes_are_refused_except_by_rigid():
 
 
 def boxes(places):
-    from neurosym.geometry.assembly import boxes_part
+    from neurosym.geometry.shapes import boxes_part
 
     return ns.Assembly(tuple(boxes_part(n, np.array(c, dtype=float), np.ones(3)) for n, c in places.items()))
 

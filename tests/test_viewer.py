@@ -329,7 +329,7 @@ def test_round_things_are_outlined_at_their_sharp_edges_only():
 
 def test_facts_agree_with_what_planners_ask(soma):
     problem, _ = soma
-    world, there = problem.world, problem.world.names
+    world, there = problem.geometry, problem.world.names
     free = ns.predicates.free(next(f for f in problem.domain.fluents if f.name == "present"))
     for name in world.names:
         found = part_facts(world, name, there)

@@ -16,14 +16,9 @@ from neurosym.errors import InputError
 from neurosym.geometry.paths import voxel_search
 from neurosym.geometry.paths.grid import GridCells, cells_of
 from neurosym.geometry.paths.path_check import check_path
-from neurosym.geometry.paths.voxel_moves import (
-    DIRECTIONS,
-    Separation,
-    Stuck,
-    first_separation,
-    separation_path,
-    take_apart,
-)
+from neurosym.geometry.paths.voxel_search import first_separation
+from neurosym.geometry.paths.voxel_separation import DIRECTIONS, Separation, Stuck, separation_path
+from neurosym.geometry.queries import AssemblyGeometry
 from neurosym.testing.burrs import BOLTS, BURRS, LEVEL_4, PAIRS, RINGS, STRAIGHT, burr, read_layers
 
 FAR = 12
@@ -32,6 +27,26 @@ FAR = 12
 def grid(cells) -> GridCells:
     arrays = tuple(np.array(sorted(c), dtype=np.int64) for c in cells.values())
     return GridCells(tuple(cells), arrays, np.ones(3), np.eye(3), np.zeros(3))
+
+
+def take_apart(cells: GridCells, among: int) -> tuple[list[Separation], Stuck | None]:
+    """Separate a block, then both halves as they are in one's hands, until every part is single, or one is stuck.
+
+    Nothing is lost by taking the first separation that comes: what takes the whole apart takes every subset apart, and
+    moves can be undone. So where a sub-assembly is stuck for good, the whole is.
+    """
+    steps, blocks = [], [(among, {})]
+    while blocks:
+        block, start = blocks.pop()
+        if block.bit_count() < 2:
+            continue
+        found = first_separation(cells, block, start=start)
+        if isinstance(found, Stuck):
+            return steps, found
+        steps.append(found)
+        halves = (found.group, found.rest)
+        blocks.extend((half, {p: o for p, o in found.offsets.items() if half >> p & 1}) for half in halves)
+    return steps, None
 
 
 def brute_level(cells, fixed=(), floor=None, cap=4000):
@@ -149,15 +164,15 @@ def test_burrs_have_the_levels_that_they_state(puzzle):
     cells = puzzle.cells
     full = (1 << len(cells)) - 1
     assert brute_level(cells) == (None if puzzle.levels is None else puzzle.levels[0])
-    result = take_apart(grid(cells), full)
+    steps, stuck = take_apart(grid(cells), full)
     if puzzle.levels is None:
-        assert result.stuck is not None
-        assert result.stuck.proved
-        assert result.stuck.block == full
+        assert stuck is not None
+        assert stuck.proved
+        assert stuck.block == full
     else:
-        assert result.stuck is None
-        assert result.levels == puzzle.levels
-    graph = ns.Assembly.from_cells(cells).blocking()
+        assert stuck is None
+        assert tuple(step.level for step in steps) == puzzle.levels
+    graph = AssemblyGeometry(ns.Assembly.from_cells(cells)).blocking()
     single_is_free = any(graph.free_directions(p, full) for p in range(len(cells)))
     assert single_is_free == (puzzle is STRAIGHT)
     assert puzzle.groups == (puzzle is PAIRS)
@@ -181,9 +196,9 @@ def test_every_step_of_a_disassembly_passes_the_check_of_paths(name, turn):
     on_grid = cells_of(assembly)
     assert on_grid is not None
     full = (1 << len(cells)) - 1
-    result = take_apart(on_grid, full)
-    assert result.levels == burr(name).levels
-    for step in result.steps:
+    steps, _ = take_apart(on_grid, full)
+    assert tuple(step.level for step in steps) == burr(name).levels
+    for step in steps:
         for home in (True, False):
             path = separation_path(on_grid, step, home=home)
             assert path.kind == "moves"
@@ -228,8 +243,8 @@ def test_the_level_depends_on_no_name_order_or_frame(names, axes, flips):
         name: [tuple((-1 if flips[k] else 1) * c[axes[k]] for k in range(3)) for c in own]
         for name, own in sorted(cells.items())
     }
-    result = take_apart(grid(turned), 0b111)
-    assert result.levels == LEVEL_4.levels
+    steps, _ = take_apart(grid(turned), 0b111)
+    assert tuple(step.level for step in steps) == LEVEL_4.levels
 
 
 def test_a_search_that_may_not_go_on_proves_nothing():

@@ -13,7 +13,7 @@ from neurosym.errors import InputError
 
 if TYPE_CHECKING:
     from neurosym.geometry.assembly import Assembly
-    from neurosym.geometry.readers.reading import Reading
+    from neurosym.geometry.readers.references import Reading
     from neurosym.language.problem import Problem
 
 
@@ -67,7 +67,7 @@ class FileOptions:
 
     def reading(self) -> Reading:
         """As the library takes them."""
-        from neurosym.geometry.readers.reading import Reading
+        from neurosym.geometry.readers.references import Reading
 
         return Reading(**{**vars(self), "up": None if self.up is None else self.up.value})
 

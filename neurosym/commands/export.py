@@ -47,7 +47,9 @@ def export(
     if graph is not None:
         from neurosym.geometry.blocking.export import assembly_graph, write_graph
 
-        write_graph(assembly_graph(problem.world, problem.details["directions"]), graph)
+        geometry = problem.geometry
+        assert geometry is not None
+        write_graph(assembly_graph(geometry.blocking(problem.details["directions"]), geometry.contacts), graph)
         written.append(graph)
     if pddl is not None:
         from neurosym.pddl.export import as_pddl

@@ -43,15 +43,14 @@ def inspect(
 
 def _level(problem: Problem) -> int | None:
     """Moves of groups, at the least, to the first separation; None: there is none, or it was not found."""
-    from neurosym.geometry.paths.grid import cells_of
-    from neurosym.geometry.paths.voxel_moves import Separation, first_separation
+    from neurosym.geometry.paths.voxel_search import first_separation
+    from neurosym.geometry.paths.voxel_separation import Separation
 
-    world = problem.world
-    cells = cells_of(world)
-    if cells is None or len(world) < 2:
+    geometry, world = problem.geometry, problem.world
+    if geometry is None or geometry.cells is None or len(world) < 2:
         return None
     ground = world.ground if world.has_table else None
-    found = first_separation(cells, (1 << len(world)) - 1, fixed=world.fixed_mask, ground=ground)
+    found = first_separation(geometry.cells, (1 << len(world)) - 1, fixed=world.fixed_mask, ground=ground)
     return found.level if isinstance(found, Separation) else None
 
 

@@ -90,7 +90,7 @@ def plan(
     For an assembly the plan takes it apart; backwards, it puts it together.
     """
     from neurosym.experiments.benchmark import NO_PRIOR
-    from neurosym.geometry.readers.reading import reference
+    from neurosym.geometry.readers.references import reference
     from neurosym.pipeline import plans, solve
     from neurosym.planning.planner import Budget
     from neurosym.registry import load_domain

@@ -58,3 +58,12 @@ def shifted(way: Array) -> Array:
     X = np.eye(4)
     X[:3, 3] = way
     return X
+
+
+def are_rigid(X: Array) -> NDArray[np.bool_]:
+    """bool (...): which of the matrices, float64 (..., 4, 4), are finite rotations with a shift, last row 0 0 0 1."""
+    R = X[..., :3, :3]
+    with np.errstate(invalid="ignore", over="ignore"):
+        turned = np.isclose(R @ R.swapaxes(-1, -2), np.eye(3), rtol=0.0, atol=1e-6).all(axis=(-1, -2))
+        upright = np.isclose(X[..., 3, :], (0, 0, 0, 1)).all(axis=-1)
+        return np.asarray(np.isfinite(X).all(axis=(-1, -2)) & turned & upright & (np.linalg.det(R) > 0))

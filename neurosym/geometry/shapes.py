@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from neurosym.errors import AssemblyError
+from neurosym.support.arrays import Array, Numbers
 
 #: Corners of a unit box about the origin, and its twelve triangles with outward normals.
 _CORNERS = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
@@ -30,7 +30,7 @@ class Box:
         return _CORNERS * self.size
 
     @property
-    def faces(self) -> NDArray[np.int64]:
+    def faces(self) -> Numbers:
         return _BOX_FACES
 
 
@@ -39,7 +39,7 @@ class Convex:
     """A convex body. ``vertices``: float64 (n, 3); ``faces``: int64 (m, 3), outward."""
 
     vertices: Array
-    faces: NDArray[np.int64]
+    faces: Numbers
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +47,7 @@ class Mesh:
     """A closed triangle mesh, convex or not. ``vertices``: float64 (n, 3); ``faces``: int64 (m, 3), outward."""
 
     vertices: Array
-    faces: NDArray[np.int64]
+    faces: Numbers
 
 
 Shape = Box | Convex | Mesh
@@ -69,6 +69,13 @@ class Part:
     bodies: tuple[Body, ...]
     X_WP: Array
     density: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not self.bodies:
+            raise AssemblyError(f"Expected part {self.name!r} to have at least one body; it is empty.")
+        arrays = (array for b in self.bodies for array in (b.shape.vertices, self.X_WP @ b.X_PB))
+        if not all(np.isfinite(array).all() for array in arrays):
+            raise AssemblyError(f"Expected finite coordinates; part {self.name!r} has NaN or infinity.")
 
 
 def boxes_part(name: str, centres: Array, size: Array, X_WP: Array | None = None, density: float = 1.0) -> Part:

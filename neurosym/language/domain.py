@@ -6,6 +6,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from neurosym.errors import DefinitionError
+from neurosym.geometry.assembly import Assembly
+from neurosym.geometry.queries import AssemblyGeometry
 from neurosym.language.actions import Action
 from neurosym.language.problem import Problem, Simulation, checked_pairs
 from neurosym.language.semantics import Semantics
@@ -61,7 +63,8 @@ class Domain:
             objects: names of the objects of each type.
             init: fluents that hold at first; all others do not. Any partial state will do.
             goal: atoms and literals, derived predicates among them.
-            world: what derived predicates are given, for instance an `Assembly`.
+            world: what derived predicates are given; of an `Assembly` its `AssemblyGeometry`. Give that one yourself,
+                and several problems share what it knows.
             before: pairs (a, b) of names of action primitives: b may be done only after a.
             interchangeable: groups of names of action primitives that may be swapped for one another.
             name: for messages and files.
@@ -75,9 +78,10 @@ class Domain:
                 action can reach, precedence in a circle.
         """
         place = f"problem {name!r}"
+        geometry = AssemblyGeometry.of(world) if isinstance(world, Assembly | AssemblyGeometry) else None
         problem = Problem(
             self,
-            world,
+            geometry.assembly if geometry else world,
             {kind: tuple(names) for kind, names in objects.items()},
             tuple(init),
             tuple(as_literal(g, f"{place}, goal[{i}]") for i, g in enumerate(goal)),
@@ -88,6 +92,7 @@ class Domain:
             dict(details or {}),
             simulation,
             semantics or Semantics(),
+            geometry=geometry,
         )
         problem.ground()
         return problem

@@ -36,7 +36,7 @@ class GroundProblem:
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
-        self.world = problem.world
+        self.world = problem.predicate_world
         instances, all_names = self._instances()
         reachable = _reachable(set(problem.init), instances)
         self.actions: tuple[str, ...] = tuple(i.name for i in reachable)

@@ -1,4 +1,4 @@
-"""Ready-made geometric predicates for domains whose world is an `Assembly`.
+"""Ready-made geometric predicates for domains whose world is an `Assembly`; they ask its `AssemblyGeometry`.
 
 Each is made from the fluent that says which parts are there:
 
@@ -17,8 +17,7 @@ from dataclasses import replace
 from numpy.typing import ArrayLike
 
 from neurosym.errors import DefinitionError
-from neurosym.geometry.assembly import Assembly
-from neurosym.geometry.blocking.sweep import exits_along
+from neurosym.geometry.queries import AssemblyGeometry
 from neurosym.geometry.step_motion import StepMotion
 from neurosym.language import formulas
 from neurosym.language.search_problem import Verdict
@@ -41,37 +40,33 @@ def free(
     """
     part = _part_type(present)
 
-    def ask(world: Assembly, state: State, p: str) -> Verdict:
+    def ask(world: AssemblyGeometry, state: State, p: str) -> Verdict:
         graph = world.blocking(directions)
-        names = world.names
         number = world.index[p]
-        there = state.mask(present, names) & ~(1 << number)
-        into_table = graph.into_table
+        there = state.mask(present, world.names) & ~(1 << number)
         witnesses, because = 0, 0
-        for d in range(len(graph.directions)):
-            if table and into_table[d]:
+        hits = {}
+        for d in range(len(graph.vectors)):
+            if table and graph.into_table[d]:
                 continue
-            if world.keeps_answers:
-                hit = graph.by_part[d][number] & there
-            else:
-                hit = sum(1 << o for o in exits_along(world, number, graph.directions[d], bits(there)))
+            hit = graph.blockers(number, d, there)
             if not hit:
                 motion = StepMotion(direction=graph.vectors[d])
                 return Verdict(True, (), f"{p} is free along {graph.describe(d)}.", motion=motion)
+            hits[d] = hit
             because |= hit
             # One blocker a direction keeps the promise; one that blocks several keeps it for all of them.
             if not witnesses & hit:
                 witnesses |= hit & -hit
         said = "; ".join(
-            f"{graph.describe(d)}: "
-            + ("the table" if table and into_table[d] else ", ".join(world.in_mask(graph.by_part[d][number] & there)))
-            for d in range(len(graph.directions))
+            f"{graph.describe(d)}: {', '.join(world.in_mask(hits[d])) if d in hits else 'the table'}"
+            for d in range(len(graph.vectors))
         )
         until = tuple(Atom(present, (n,)) for n in world.in_mask(witnesses)) if removal else None
         said = f"{p} is blocked in every direction ({said})."
         return Verdict(False, world.in_mask(because), said, until, unconditional=True)
 
-    def formula(world: Assembly, p: str) -> formulas.AnyOf:
+    def formula(world: AssemblyGeometry, p: str) -> formulas.AnyOf:
         graph = world.blocking(directions)
         ways = []
         for d in range(len(graph.directions)):
@@ -87,7 +82,7 @@ def interlocked(present: Fluent, *, directions: ArrayLike | None = None, table: 
     """``interlocked()``: no single part of those present is free (they may still come apart in groups)."""
     one = free(present, directions=directions, table=table).function
 
-    def ask(world: Assembly, state: State) -> Verdict:
+    def ask(world: AssemblyGeometry, state: State) -> Verdict:
         there = state.objects(present)
         for p in there:
             verdict = one(world, state, p)
@@ -102,8 +97,8 @@ def supported(present: Fluent, *, removal: bool = True) -> Derived:
     """``supported(p)``: something under part p, a part present or the table, touches it from below."""
     part = _part_type(present)
 
-    def ask(world: Assembly, state: State, p: str) -> Verdict:
-        stability = world.stability()
+    def ask(world: AssemblyGeometry, state: State, p: str) -> Verdict:
+        stability = world.stability
         number = world.index[p]
         carriers = world.in_mask(stability.supports[number] & state.mask(present, world.names))
         if stability.on_table >> number & 1:
@@ -113,8 +108,8 @@ def supported(present: Fluent, *, removal: bool = True) -> Derived:
         lost = world.in_mask(stability.supports[number])
         return Verdict(False, lost, f"{p} has lost {', '.join(lost) or 'nothing'} under it.", () if removal else None)
 
-    def formula(world: Assembly, p: str) -> formulas.AnyOf:
-        stability = world.stability()
+    def formula(world: AssemblyGeometry, p: str) -> formulas.AnyOf:
+        stability = world.stability
         number = world.index[p]
         if stability.on_table >> number & 1:
             return formulas.AnyOf((formulas.Way("on the table", ()),))
@@ -135,26 +130,28 @@ def stable_without(present: Fluent, *, removal: bool = True, held: int = 0) -> D
     """
     part = _part_type(present)
 
-    def ask(world: Assembly, state: State, p: str) -> Verdict:
+    def ask(world: AssemblyGeometry, state: State, p: str) -> Verdict:
         rest = state.mask(present, world.names) & ~(1 << world.index[p])
         return stands(world, rest, (p,), present if removal and not held else None, held)
 
-    def check(world: Assembly, state: State, motion: StepMotion, p: str) -> Verdict:
+    def check(world: AssemblyGeometry, state: State, motion: StepMotion, p: str) -> Verdict:
         hands = motion.held
         if len(hands) > held or p in hands:
             return Verdict(False, hands, f"Step {p}: expected at most {held} of the others to be held; got {hands}.")
         rest = state.mask(present, world.names) & ~(1 << world.index[p])
-        if world.stability().standing(rest, held=world.mask(hands)).stands:
+        if world.stability.standing(rest, held=world.mask(hands)).stands:
             return Verdict(True, (), f"The others stand without {p}.", motion=motion)
-        return ask(world, state, p) if not hands else _falls(world, world.stability().standing(rest).moving, (p,), held)
+        return ask(world, state, p) if not hands else _falls(world, world.stability.standing(rest).moving, (p,), held)
 
-    def formula(world: Assembly, p: str) -> formulas.Stands:
+    def formula(world: AssemblyGeometry, p: str) -> formulas.Stands:
         return formulas.Stands(present, p, held)
 
     return Derived("stable_without", [part], ask, check=check, formula=formula)
 
 
-def stands(world: Assembly, rest: int, leaving: Sequence[str], present: Fluent | None = None, held: int = 0) -> Verdict:
+def stands(
+    world: AssemblyGeometry, rest: int, leaving: Sequence[str], present: Fluent | None = None, held: int = 0
+) -> Verdict:
     """Whether the parts in the bitset `rest` stand once those in `leaving` are gone.
 
     Args:
@@ -162,7 +159,7 @@ def stands(world: Assembly, rest: int, leaving: Sequence[str], present: Fluent |
         held: how many may be held.
     """
     said = ", ".join(leaving)
-    answer = world.stability().standing_when_held(rest, held) if held else world.stability().standing(rest)
+    answer = world.stability.standing_when_held(rest, held) if held else world.stability.standing(rest)
     if answer.stands:
         motion = StepMotion(held=world.in_mask(answer.held)) if answer.held else None
         return Verdict(True, (), f"The others stand without {said}.", motion=motion)
@@ -172,7 +169,7 @@ def stands(world: Assembly, rest: int, leaving: Sequence[str], present: Fluent |
     return replace(verdict, until=until)
 
 
-def _falls(world: Assembly, moving: int, leaving: Sequence[str], held: int) -> Verdict:
+def _falls(world: AssemblyGeometry, moving: int, leaving: Sequence[str], held: int) -> Verdict:
     falling = world.in_mask(moving)
     lost = losses(world, moving, world.mask(leaving))
     said = f"Without {listed(leaving)}, {listed(falling)} would fall"
@@ -183,9 +180,9 @@ def _falls(world: Assembly, moving: int, leaving: Sequence[str], held: int) -> V
     return Verdict(False, falling, f"{said}.")
 
 
-def losses(world: Assembly, falling: int, leaving: int) -> tuple[tuple[str, str], ...]:
+def losses(world: AssemblyGeometry, falling: int, leaving: int) -> tuple[tuple[str, str], ...]:
     """Pairs of names (a, b): a is one of `falling` and touches b, one of `leaving` (bitsets of parts)."""
-    touching = world.stability().touching
+    touching = world.stability.touching
     return tuple((world.names[a], b) for a in bits(falling) for b in world.in_mask(touching[a] & leaving))
 
 

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from neurosym.errors import DefinitionError, InputError, UnknownNameError
+from neurosym.geometry.queries import AssemblyGeometry
 from neurosym.language.actions import Action
 from neurosym.language.semantics import Semantics
 from neurosym.language.terms import Atom, Derived, Literal, Type, Variable
@@ -45,7 +46,12 @@ class Simulation:
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """A problem: a domain, a world, and what holds at first and at last. Made by `Domain.problem`."""
+    """A problem: a domain, a world, and what holds at first and at last. Made by `Domain.problem`.
+
+    Attributes:
+        world: whatever the domain is about, for instance an `Assembly`.
+        geometry: the object that answers questions about a world that is an `Assembly`; None for others.
+    """
 
     domain: Domain
     world: Any
@@ -60,6 +66,7 @@ class Problem:
     simulation: Simulation | None = None
     semantics: Semantics = field(default_factory=Semantics)
     pictures: NDArray[np.uint8] | None = None
+    geometry: AssemblyGeometry | None = None
 
     def __post_init__(self) -> None:
         place = f"problem {self.name!r} of domain {self.domain.name!r}"
@@ -104,6 +111,11 @@ class Problem:
                 raise DefinitionError(f"In {place}: {atom}: unknown object. {known}")
             if not actual.is_a(kind):
                 raise DefinitionError(f"In {place}: {atom}: expected a {kind}; {arg!r} is a {actual}.")
+
+    @property
+    def predicate_world(self) -> Any:
+        """What derived predicates are given: `geometry` where there is one, else the world as it is."""
+        return self.geometry or self.world
 
     @cached_property
     def type_of(self) -> dict[str, Type]:

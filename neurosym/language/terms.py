@@ -111,7 +111,8 @@ class Fluent(_Predicate):
 class Derived(_Predicate):
     """A predicate that is computed from the world and the state, not changed by effects.
 
-    Its function takes the world, the state and the names of the objects, and answers with a `Verdict`.
+    Its function takes the world (of an `Assembly` its `AssemblyGeometry`), the state and the names of the objects, and
+    answers with a `Verdict`.
 
     Args:
         check: for answers that are found by a search and say a motion: takes the world, the state, the motion of a step

@@ -99,7 +99,8 @@ def weighed(
     """
     from neurosym.geometry.stability.falls import find_falls  # geometry is no part of the language
 
-    world, init = problem.world, frozenset(problem.init)
+    world, init = problem.geometry, frozenset(problem.init)
+    assert world is not None
     first = next(s for s in asked.values() if s)
     present = first.present
     moves: dict[int, list[int]] = {}
@@ -111,9 +112,9 @@ def weighed(
     initial = world.mask(n for n in world.names if present(n) in init)
     removed = {name: world.index[s.without] for name, s in asked.items() if s}
     orders = [[removed[name] for name in order if name in removed] for order in refuted]
-    found = find_falls(world, initial, moves, held=first.held, refuted=orders, seconds=seconds)
+    found = find_falls(world.stability, initial, moves, held=first.held, refuted=orders, seconds=seconds)
     removals = [(s.without, i) for i in instances if (s := asked[i.name])]
-    kept = _avert(world, present, found.falls, removals)
+    kept = _avert(world.assembly, present, found.falls, removals)
     return Weighed(
         [i for i in instances if i.ways],
         _helpers(kept),

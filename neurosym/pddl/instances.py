@@ -76,7 +76,7 @@ def formulas_of(problem: Problem, instance: Instance) -> list[Formula] | None:
         predicate = literal.atom.predicate
         assert isinstance(predicate, Derived)
         formula = predicate.formula
-        said = formula(problem.world, *literal.atom.args) if formula and literal.positive else None
+        said = formula(problem.predicate_world, *literal.atom.args) if formula and literal.positive else None
         if said is None:
             return None
         found.append(said)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from neurosym.errors import InputError
-from neurosym.geometry.readers.reading import referenced
+from neurosym.geometry.readers.references import referenced
 from neurosym.geometry.step_motion import StepMotion
 from neurosym.plan_files.writing import SCHEMA
 from neurosym.registry import load_domain

@@ -6,8 +6,8 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 from neurosym.errors import InputError
-from neurosym.geometry.assembly import Assembly
-from neurosym.geometry.contact.contacts import TABLE
+from neurosym.geometry.contact.contacts import TABLE, areas_between
+from neurosym.geometry.queries import AssemblyGeometry
 from neurosym.geometry.step_motion import GROUND
 from neurosym.language.explanation import WhyNot
 
@@ -78,8 +78,8 @@ def inspect_problem(problem: Problem) -> Inspection:
     Raises:
         InputError: a problem of another kind.
     """
-    world = problem.world
-    if not isinstance(world, Assembly) or problem.details.get("paths") != "straight":
+    world = problem.geometry
+    if world is None or problem.details.get("paths") != "straight":
         raise InputError(f'Expected a problem of the domain "assembly" with paths="straight"; got {problem!r}.')
     graph = world.blocking(problem.details["directions"])
     everything = (1 << len(world)) - 1
@@ -89,42 +89,36 @@ def inspect_problem(problem: Problem) -> Inspection:
         if (directions := graph.free_directions(i, everything))
     }
     why = problem.semantics.refute(problem)
-    standing = world.stability().standing_when_held(everything, problem.details["held"])
+    standing = world.stability.standing_when_held(everything, problem.details["held"])
     stands = standing.stands or not problem.details["gravity"]
     return Inspection(
         parts=_parts(world),
         contacts=_contacts(world),
         free=tuple(free),
         free_along=free,
-        interlocked=() if why is None else tuple(n for n in why.left if n not in world.fixed),
+        interlocked=() if why is None else tuple(n for n in why.left if n not in world.assembly.fixed),
         why=why,
         stands=stands,
         falls=() if stands else world.in_mask(standing.moving),
         held=world.in_mask(standing.held) if stands else (),
-        notes=tuple(map(str, world.notes)),
+        notes=tuple(map(str, world.assembly.notes)),
     )
 
 
-def _parts(world: Assembly) -> tuple[PartFacts, ...]:
-    masses = world.stability().masses
-    found = []
-    for i, part in enumerate(world.parts):
-        own = world.body_bounds[world.owners == i]
-        low, high = (tuple(map(float, corner)) for corner in (own[:, 0].min(axis=0), own[:, 1].max(axis=0)))
-        mass = float(masses[i])
+def _parts(world: AssemblyGeometry) -> tuple[PartFacts, ...]:
+    facts = []
+    for part, bounds, mass in zip(world.assembly.parts, world.assembly.part_bounds.tolist(), world.stability.masses):
         faces = sum(len(body.shape.faces) for body in part.bodies)
-        volume = mass / part.density
-        found.append(PartFacts(part.name, volume, mass, (low, high), len(part.bodies), faces, part.name in world.fixed))
-    return tuple(found)
+        low, high = map(tuple, bounds)
+        fixed = part.name in world.assembly.fixed
+        facts.append(
+            PartFacts(part.name, float(mass / part.density), float(mass), (low, high), len(part.bodies), faces, fixed)
+        )
+    return tuple(facts)
 
 
-def _contacts(world: Assembly) -> tuple[Touch, ...]:
-    pairs: dict[tuple[int, int], list[float]] = {}
-    for contact in world.contacts():
-        a = int(world.owners[contact.a])
-        b = TABLE if contact.b == TABLE else int(world.owners[contact.b])
-        pairs.setdefault((a, b) if b == TABLE or a < b else (b, a), []).append(contact.area)
+def _contacts(world: AssemblyGeometry) -> tuple[Touch, ...]:
     return tuple(
         Touch(world.names[a], GROUND if b == TABLE else world.names[b], float(sum(areas)), len(areas))
-        for (a, b), areas in sorted(pairs.items())
+        for (a, b), areas in sorted(areas_between(world.assembly, world.contacts).items())
     )

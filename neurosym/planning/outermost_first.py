@@ -10,6 +10,7 @@ import numpy as np
 from neurosym.errors import InputError
 from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.blocking.directions import Directions
+from neurosym.geometry.queries import AssemblyGeometry
 from neurosym.planning.prior import OrderScores, Prior
 from neurosym.support.bitsets import bits
 
@@ -42,11 +43,11 @@ class OutermostFirst(Prior):
         return [self._scores(problem) for problem in problems]
 
     def _scores(self, problem: Problem) -> OrderScores:
-        world = problem.world
+        world = problem.geometry
         removes = {} if problem.simulation is None else problem.simulation.removes
         parts = [removes.get(action, action) for action in problem.actions]
-        strange = [n for n in parts if not isinstance(world, Assembly) or n not in world.index]
-        if strange:
+        strange = [n for n in parts if world is None or n not in world.index]
+        if world is None or strange:
             raise InputError(
                 "Expected a problem whose world is an Assembly and whose actions are named after its parts, for the "
                 f"prior outermost-first; {problem.name!r} has the action {strange[0]!r}."
@@ -60,16 +61,19 @@ class OutermostFirst(Prior):
         return OrderScores(table, problem.actions, classes=problem.classes)
 
 
-def outermost_order(assembly: Assembly, directions: Directions = None, *, gravity: bool = True) -> list[str]:
+def outermost_order(
+    given: Assembly | AssemblyGeometry, directions: Directions = None, *, gravity: bool = True
+) -> list[str]:
     """Names of all parts, the outermost first, fixed ones last."""
-    graph, up = assembly.blocking(directions), assembly.blocking("+z")
+    geometry = AssemblyGeometry.of(given)
+    assembly, graph, up = geometry.assembly, geometry.blocking(directions), geometry.blocking("+z")
     fixed = assembly.fixed_mask
     left = (1 << len(assembly)) - 1 & ~fixed
-    bounds = [assembly.body_bounds[assembly.owners == i] for i in range(len(assembly))]
     # In steps of the touching tolerance: heights that differ by rounding are equal.
-    height = [round(float(own[:, 1, 2].max()) / assembly.touch) for own in bounds]
+    height = [round(high / assembly.touch) for high in assembly.part_bounds[:, 1, 2].tolist()]
     middle = assembly.bounds.mean(axis=0)
-    distance = [float(np.linalg.norm(own.mean(axis=(0, 1)) - middle)) for own in bounds]
+    own = (assembly.body_bounds[assembly.owners == i] for i in range(len(assembly)))
+    distance = [float(np.linalg.norm(bounds.mean(axis=(0, 1)) - middle)) for bounds in own]
     order: list[int] = []
     while left:
         free = [i for i in bits(left) if graph.free_directions(i, left | fixed)] or bits(left)

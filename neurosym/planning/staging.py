@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from neurosym.errors import InputError, UnknownNameError
 from neurosym.geometry.assembly import Assembly
-from neurosym.geometry.paths.path_check import centre_of
+from neurosym.geometry.queries import AssemblyGeometry
 from neurosym.geometry.rigid_motions import shifted
 from neurosym.geometry.step_motion import StepMotion, Track, Vector, check_motions
 from neurosym.language.actions import moved_parts
@@ -89,12 +89,12 @@ def stage(problem: Problem, plan: Sequence[str], motions: Sequence[StepMotion | 
     staging = problem.semantics.staging(problem, plan, motions)
     if staging is not None:
         return staging
-    world, moved = problem.world, dict[str, tuple[tuple[str, ...], bool]]()
+    world, geometry, moved = problem.world, problem.geometry, dict[str, tuple[tuple[str, ...], bool]]()
     absent: set[str] = set()
     if problem.simulation is not None:
         moved = {action: ((part,), False) for action, part in problem.simulation.removes.items()}
         absent.update(problem.simulation.absent)
-    elif isinstance(world, Assembly):
+    elif geometry is not None:
         for action in problem.domain.actions:
             for binding in problem.bindings(action):
                 effects = [e.bind(binding) for e in action.eff]
@@ -107,18 +107,18 @@ def stage(problem: Problem, plan: Sequence[str], motions: Sequence[StepMotion | 
         parts, arrive = moved.get(name, ((), False))
         whole.append((motion or StepMotion()).of_parts(parts, arrive=arrive))
         absent |= set(whole[-1].parts) if whole[-1].arrives else set()
-    if not isinstance(world, Assembly) or not all(motion.parts for motion in whole):
+    if geometry is None or not all(motion.parts for motion in whole):
         raise InputError(
             f"Expected a problem that says what its actions do to parts in space; {problem.name!r} does not. Give "
             "Domain.problem a world that is an Assembly and simulation=Simulation('rigid', removes={action: part}), or "
             "semantics= with a method staging."
         )
     # A plan that puts together begins with what it does not bring.
-    return staged(world, [n for n in world.names if n not in absent], plan, whole)
+    return staged(geometry, [n for n in world.names if n not in absent], plan, whole)
 
 
 def staged(
-    assembly: Assembly, present: Sequence[str], plan: Sequence[str], motions: Sequence[StepMotion]
+    given: Assembly | AssemblyGeometry, present: Sequence[str], plan: Sequence[str], motions: Sequence[StepMotion]
 ) -> Staging:
     """A plan in space whose motions say which parts move: straight ones lead as far as the others reach.
 
@@ -127,13 +127,13 @@ def staged(
         plan: names of the actions.
         motions: one a step.
     """
-    there, long = set(present), []
+    geometry, there, long = AssemblyGeometry.of(given), set(present), []
     for motion in motions:
         others = there - set(motion.parts)
-        long.append(motion if motion.tracks else _straight(assembly, motion, others))
+        long.append(motion if motion.tracks else _straight(geometry, motion, others))
         there = others | set(motion.parts) if motion.arrives else others
     guessed = frozenset(i for i, m in enumerate(motions) if not m.tracks and not m.direction)
-    return Staging(assembly, tuple(present), tuple(plan), tuple(long), guessed=guessed)
+    return Staging(geometry.assembly, tuple(present), tuple(plan), tuple(long), guessed=guessed)
 
 
 def building(
@@ -144,35 +144,36 @@ def building(
 ) -> Staging:
     """The staging of a plan that puts parts in place from above, one a step, each action named after its part."""
     down = [StepMotion((action,), (0.0, 0.0, -1.0), arrives=True) for action in plan]
-    long = [_straight(assembly, motion, assembly.names) for motion in down]
+    geometry = AssemblyGeometry(assembly)
+    long = [_straight(geometry, motion, assembly.names) for motion in down]
     return Staging(assembly, tuple(present), tuple(plan), tuple(long), colours or {})
 
 
-def _straight(assembly: Assembly, motion: StepMotion, others: Collection[str]) -> StepMotion:
+def _straight(geometry: AssemblyGeometry, motion: StepMotion, others: Collection[str]) -> StepMotion:
     """Straight until past the bounds of all `others`, and `CLEARANCE` on; without a direction, along a free one."""
-    outward = motion.outward or _free_direction(assembly, motion.parts, others)
+    assembly = geometry.assembly
+    outward = motion.outward or _free_direction(geometry, motion.parts, others)
     unit = np.array(outward) / np.linalg.norm(outward)
     low, high = _extent(assembly, motion.parts, unit)
     _, end = _extent(assembly, others, unit) if others else (low, high)
     poses = np.stack([np.eye(4), shifted(unit * (max(end - low, 0.0) + CLEARANCE * (high - low)))])
-    track = Track(motion.parts, poses, centre_of(assembly, assembly.mask(motion.parts)))
+    track = Track(motion.parts, poses, assembly.bodies.centre(assembly.mask(motion.parts)))
     out = replace(motion, direction=outward, tracks=(track,), arrives=False)
     return out.reversed() if motion.arrives else out
 
 
-def _free_direction(assembly: Assembly, parts: Sequence[str], others: Collection[str]) -> Vector:
+def _free_direction(geometry: AssemblyGeometry, parts: Sequence[str], others: Collection[str]) -> Vector:
     """Of the assembly's axes, upward first, one along which no other stands in the way of `parts`.
 
     Where there is none: the one with the fewest in the way. Downward, into the table, only as a last resort.
     """
-    graph = assembly.blocking()
-    group, there = assembly.mask(parts), assembly.mask(others)
+    graph = geometry.blocking()
+    group, there = geometry.mask(parts), geometry.mask(others)
     in_way = [graph.group_blockers(group, d, there).bit_count() for d in range(len(graph.vectors))]
     best = min(range(len(in_way)), key=lambda d: (bool(graph.into_table[d]), in_way[d], d))
     return graph.vectors[best]
 
 
 def _extent(assembly: Assembly, parts: Collection[str], unit: Array) -> tuple[float, float]:
-    wanted = {assembly.index[name] for name in parts}
-    spans = [assembly.body_vertices(i) @ unit for i, owner in enumerate(assembly.owners) if int(owner) in wanted]
-    return min(float(s.min()) for s in spans), max(float(s.max()) for s in spans)
+    heights = assembly.bodies.points(assembly.mask(parts)) @ unit
+    return float(heights.min()), float(heights.max())

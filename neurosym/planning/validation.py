@@ -1,4 +1,4 @@
-"""Independent replay of an order. Shares no code with planners or grounding, and asks geometry afresh."""
+"""Independent replay of an order. Shares no code with planners or grounding, and asks geometry anew."""
 
 from __future__ import annotations
 
@@ -41,7 +41,8 @@ def validate(problem: Problem, order: Sequence[str], motions: Sequence[StepMotio
     replayed = problem.semantics.replay(problem, order, motions)
     if replayed is not None:
         return replayed
-    world = problem.world.afresh() if hasattr(problem.world, "afresh") else problem.world
+    world = problem.predicate_world
+    world = world.anew() if hasattr(world, "anew") else world
     state = AtomSet(set(problem.init), tuple(problem.type_of))
     done: list[str] = []
     possible = set(problem.actions)

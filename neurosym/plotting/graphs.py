@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import networkx as nx
 import numpy as np
 
+from neurosym.geometry.queries import AssemblyGeometry
 from neurosym.geometry.step_motion import GROUND
 from neurosym.plotting.layers import BOX, Layout, box_width, in_inches, in_layers, write_names
 from neurosym.plotting.matrices import blocking_matrices, contact_matrix, depths
@@ -36,7 +37,9 @@ _HEAD = "-|>,head_length=0.35,head_width=0.18"
 _ARROW = {"arrowstyle": _HEAD, "color": COLOURS[4], "lw": 0.8, "shrinkA": 0, "shrinkB": 0.5, "zorder": 3}
 
 
-def blocking_figure(assembly: Assembly, directions: Directions = None, *, title: str = "assembly") -> Figure:
+def blocking_figure(
+    assembly: Assembly | AssemblyGeometry, directions: Directions = None, *, title: str = "assembly"
+) -> Figure:
     """A panel a direction and its opposite: an arrow leads from a part to one that it would hit, moved that way.
 
     Parts on top are free; those in a frame hit one another, and can leave only together. Arrows that follow from others
@@ -47,7 +50,8 @@ def blocking_figure(assembly: Assembly, directions: Directions = None, *, title:
         directions: as `directions_for` takes them; default the axes.
         title: what it is.
     """
-    graph = assembly.blocking(directions)
+    geometry = AssemblyGeometry.of(assembly)
+    assembly, graph = geometry.assembly, geometry.blocking(directions)
     chosen = _one_way(graph)
     shown = chosen[:MOST_PANELS]
     count = f"{len(shown)} of {len(chosen)}" if len(chosen) > len(shown) else f"{len(chosen)}"
@@ -73,20 +77,20 @@ def blocking_figure(assembly: Assembly, directions: Directions = None, *, title:
     return figure
 
 
-def contact_figure(assembly: Assembly, *, title: str = "assembly") -> Figure:
+def contact_figure(assembly: Assembly | AssemblyGeometry, *, title: str = "assembly") -> Figure:
     """A line a pair of parts that touch, as thick as the root of the area; the parts in layers, from the ground up.
 
     Without a ground the layers count from the fixed parts, or from the first one. Of more than `MOST_NODES` parts a
     matrix is drawn, coloured by area.
     """
-    from neurosym.geometry.contact.contacts import TABLE  # loads FCL
+    from neurosym.geometry.contact.contacts import TABLE, areas_between  # loads FCL
 
-    areas: dict[tuple[str, str], float] = {}
-    for contact in assembly.contacts():
-        b = GROUND if contact.b == TABLE else assembly.names[assembly.owners[contact.b]]
-        pair = (assembly.names[assembly.owners[contact.a]], b)
-        pair = pair if pair[::-1] not in areas else pair[::-1]
-        areas[pair] = areas.get(pair, 0.0) + contact.area
+    geometry = AssemblyGeometry.of(assembly)
+    assembly = geometry.assembly
+    areas = {
+        (assembly.names[a], GROUND if b == TABLE else assembly.names[b]): sum(own)
+        for (a, b), own in areas_between(assembly, geometry.contacts).items()
+    }
     unit = f"{assembly.units}²" if assembly.units else "units of length²"
     heading = f"{title}: what touches what\nn = {len(assembly)} parts, {len(areas)} contacts; areas in {unit}"
     if len(assembly) > MOST_NODES:

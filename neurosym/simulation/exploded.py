@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,7 +17,7 @@ from neurosym.simulation.scene import part_colours
 from neurosym.simulation.storyboard import best_camera
 
 if TYPE_CHECKING:
-    from neurosym.geometry.assembly import Assembly
+    pass
 
 Array = NDArray[np.float64]
 Picture = NDArray[np.uint8]
@@ -50,7 +50,7 @@ def explode(staging: Staging, *, spread: float = 1.0) -> dict[str, Array]:
     if not np.isfinite(spread) or spread < 0:
         raise InputError(f"Expected a spread of 0 or more; got {spread!r}.")
     assembly = staging.assembly
-    bounds = _part_bounds(assembly)
+    bounds = dict(zip(assembly.names, assembly.part_bounds))
     directions = _directions(staging)
     if not directions:
         middle = assembly.bounds.mean(axis=0)
@@ -95,7 +95,7 @@ def exploded_view(
         uint8 (height and a line of words, width, 3).
     """
     shifts = explode(staging, spread=spread)
-    bounds = _part_bounds(staging.assembly)
+    bounds = dict(zip(staging.assembly.names, staging.assembly.part_bounds))
     corners = [np.array(np.meshgrid(*bounds[name].T)).reshape(3, -1).T + shift for name, shift in shifts.items()]
     where = {}
     for name, shift in shifts.items():
@@ -127,15 +127,6 @@ def _directions(staging: Staging) -> dict[str, Array]:
         length = float(np.linalg.norm(way))
         if length > 0:
             found |= dict.fromkeys(motion.parts, way / length)
-    return found
-
-
-def _part_bounds(assembly: Assembly) -> Mapping[str, Array]:
-    """Part -> float64 (2, 3)."""
-    found = {}
-    for number, name in enumerate(assembly.names):
-        own = assembly.body_bounds[assembly.owners == number]
-        found[name] = np.array([own[:, 0].min(axis=0), own[:, 1].max(axis=0)])
     return found
 
 

@@ -192,7 +192,7 @@ class FilmSet(Closeable):
         p, c = self._p, self._client.id
         triangles = []
         for i in np.flatnonzero(assembly.owners == number):
-            corners = (assembly.body_vertices(int(i)) - self._middle) * self._scale
+            corners = (assembly.bodies.vertices(int(i)) - self._middle) * self._scale
             triangles.append(corners[assembly.bodies[int(i)].shape.faces])
         name = assembly.names[number]
         self._triangles[name] = np.concatenate(triangles)

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from neurosym.errors import InputError, UnknownNameError
-from neurosym.geometry.assembly import Assembly, Box, Shape
+from neurosym.geometry.assembly import Assembly
+from neurosym.geometry.shapes import Shape
 from neurosym.planning.staging import Staging
 
 Array = NDArray[np.float64]
@@ -99,11 +100,11 @@ def scene_of(
     if unknown := set(given) - set(assembly.names):
         raise UnknownNameError("part", min(unknown), assembly.names)
     chosen = [_checked(name, given.get(name, palette_colour(i))) for i, name in enumerate(assembly.names)]
-    bounds = _bounds(assembly) if frame is None else np.asarray(frame, dtype=np.float64)
+    bounds = assembly.bounds if frame is None else np.asarray(frame, dtype=np.float64)
     middle, scale = bounds.mean(axis=0), 2 / float(np.ptp(bounds, axis=0).max())
     poses = assembly.X_WB.copy()
     poses[:, :3, 3] = (poses[:, :3, 3] - middle) * scale
-    is_box = np.array([isinstance(body.shape, Box) for body in assembly.bodies])
+    is_box = assembly.bodies.is_box
     others = np.flatnonzero(~is_box)
     frames, half, owner = _faces(assembly, poses, np.flatnonzero(is_box), scale)
     meshes = {
@@ -119,20 +120,6 @@ def scene_of(
 
 def _shape(assembly: Assembly, body: int) -> Shape:
     return assembly.bodies[body].shape
-
-
-def _sizes(assembly: Assembly) -> Array:
-    """float64 (n_bodies, 3): edges of the boxes, 0 for other bodies."""
-    return np.array([b.shape.size if isinstance(b.shape, Box) else np.zeros(3) for b in assembly.bodies])
-
-
-def _bounds(assembly: Assembly) -> Array:
-    """What `assembly.bounds` says, ten times faster where all bodies are boxes: pictures come by the thousands."""
-    if not assembly.all_boxes:
-        return assembly.bounds
-    poses = assembly.X_WB
-    reach = np.einsum("nij,nj->ni", np.abs(poses[:, :3, :3]), _sizes(assembly) / 2)
-    return np.stack([(poses[:, :3, 3] - reach).min(axis=0), (poses[:, :3, 3] + reach).max(axis=0)])
 
 
 #: The six faces of a box: rotations that take z to the face's outward normal, and the axes that then lie along x and y.
@@ -153,7 +140,7 @@ def _faces(
     assembly: Assembly, poses: Array, boxes: NDArray[np.int64], scale: float
 ) -> tuple[Array, Array, NDArray[np.int64]]:
     """Frames (n, 4, 4), half edges (n, 3) and owners (n,) of the boxes' faces, without those that cover each other."""
-    half = _sizes(assembly)[boxes] * scale / 2
+    half = assembly.bodies.box_sizes[boxes] * scale / 2
     R = poses[boxes, :3, :3]
     frames = np.tile(np.eye(4), (len(boxes), 6, 1, 1))
     frames[:, :, :3, :3] = R[:, None] @ _TURNS

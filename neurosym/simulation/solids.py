@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from neurosym.errors import InputError
-from neurosym.geometry.assembly import Assembly, Body, Box, Part
+from neurosym.geometry.assembly import Assembly
+from neurosym.geometry.shapes import Body, Box, Part
 
 Array = NDArray[np.float64]
 BodiesKind = Literal["parts", "cubes"]

@@ -83,10 +83,8 @@ def room_for(staging: Staging) -> Array:
     """float64 (n, 3), in the world: bounds of all parts, resting and at places along their paths."""
     assembly, found = staging.assembly, []
     corners = {}
-    for number, name in enumerate(assembly.names):
-        bounds = assembly.body_bounds[assembly.owners == number]
-        low, high = bounds[:, 0].min(axis=0), bounds[:, 1].max(axis=0)
-        corners[name] = np.array(np.meshgrid(*zip(low, high))).reshape(3, -1).T
+    for name, bounds in zip(assembly.names, assembly.part_bounds):
+        corners[name] = np.array(np.meshgrid(*bounds.T)).reshape(3, -1).T
         found.append(corners[name])
     for motion in staging.motions:
         for share in np.linspace(0, 1, 2 * len(motion.tracks[0].poses) + 1):

@@ -6,6 +6,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 
 from neurosym.geometry.assembly import Assembly
+from neurosym.geometry.queries import AssemblyGeometry
 
 
 @dataclass(frozen=True)
@@ -52,18 +53,21 @@ class PartFacts:
     fixed: bool = False
 
 
-def part_facts(assembly: Assembly, name: str, there: Collection[str]) -> PartFacts:
+def part_facts(given: Assembly | AssemblyGeometry, name: str, there: Collection[str]) -> PartFacts:
     """The facts about a part while only the parts named in `there` are in place.
 
-    The first call for an assembly computes contacts and blocking between all pairs; later ones are bit arithmetic.
+    The first call for an `AssemblyGeometry` computes contacts and blocking between all pairs; later ones are bit
+    arithmetic.
 
     Raises:
         UnknownNameError: no such part.
     """
+    geometry = AssemblyGeometry.of(given)
+    assembly = geometry.assembly
     assembly[name]  # says which names there are
     number = assembly.index[name]
     among = assembly.mask(there) & ~(1 << number)
-    stability, graph = assembly.stability(), assembly.blocking()
+    stability, graph = geometry.stability, geometry.blocking()
     carried = sum(1 << i for i in range(len(assembly)) if stability.supports[i] >> number & 1)
     ways = tuple(
         Way(graph.describe(d), assembly.in_mask(graph.blockers(number, d, among)), bool(graph.into_table[d]))

@@ -104,7 +104,7 @@ class Page:
     def _preview(self, problem: Problem) -> None:
         """Show what is there before any step, while the first search goes on."""
         with contextlib.suppress(*REFUSED):
-            self.scene.put(Timeline(stage(problem, ())))
+            self.scene.put(Timeline(stage(problem, ()), problem.geometry))
 
     def close(self) -> None:
         """End the page's thread and any search; the server is left to who made it."""
@@ -257,7 +257,7 @@ class Page:
         # The first question about a large assembly takes seconds.
         self.part_tab.content = panels.styled("<p class='quiet'>Asking geometry …</p>")
         try:
-            self.part_tab.content = panels.styled(panels.facts(part_facts(timeline.staging.assembly, name, there)))
+            self.part_tab.content = panels.styled(panels.facts(part_facts(timeline.geometry, name, there)))
         except REFUSED as error:
             self.part_tab.content = panels.styled(panels.message(str(error)))
 

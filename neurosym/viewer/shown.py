@@ -152,7 +152,8 @@ class Shown:
         """Stage the film and take the pictures, as far as the problem has them."""
         timeline, pictures = None, None
         try:
-            timeline = Timeline(stage(problem, search.steps, search.motions or _motions(problem, search)))
+            staging = stage(problem, search.steps, search.motions or _motions(problem, search))
+            timeline = Timeline(staging, problem.geometry)
         except REFUSED as error:
             notes = (*notes, f"There is nothing to show in space: {error}")
         try:
@@ -173,7 +174,7 @@ class Shown:
 
 
 def _checked(saved: SavedPlan, search: Search) -> Search:
-    """The search that a file tells of; where its plan does not hold, by geometry asked afresh, that is said instead.
+    """The search that a file tells of; where its plan does not hold, by geometry asked anew, that is said instead.
 
     Plans that a simulation allowed are left to it (`neurosym replay`).
     """

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from neurosym.geometry.assembly import Assembly, Box
+from neurosym.geometry.assembly import Assembly
+from neurosym.geometry.shapes import Box
 
 Array = NDArray[np.float64]
 
@@ -42,7 +43,7 @@ def solids(assembly: Assembly) -> tuple[Solid, ...]:
 def _solid(assembly: Assembly, part: int) -> Solid:
     vertices, faces, squares, offset = [], [], [], 0
     for body in np.flatnonzero(assembly.owners == part):
-        shape, corners = assembly.bodies[int(body)].shape, assembly.body_vertices(int(body))
+        shape, corners = assembly.bodies[int(body)].shape, assembly.bodies.vertices(int(body))
         vertices.append(corners)
         faces.append(shape.faces + offset)
         squares.append(np.full(len(shape.faces), isinstance(shape, Box)))

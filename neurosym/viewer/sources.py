@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from neurosym.errors import InputError, UnknownNameError
-from neurosym.geometry.readers.reading import Reading
+from neurosym.geometry.readers.references import Reading
 from neurosym.language.problem import Problem
 from neurosym.plan_files.reading import SavedPlan, problem_of, read_document, read_plan
 from neurosym.registry import domain_names, load_domain

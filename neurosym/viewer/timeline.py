@@ -16,6 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from neurosym.errors import InputError
 from neurosym.geometry.assembly import Assembly
+from neurosym.geometry.queries import AssemblyGeometry
 from neurosym.geometry.rigid_motions import shifted
 from neurosym.geometry.step_motion import Track
 from neurosym.planning.staging import Staging
@@ -38,6 +39,7 @@ class Timeline:
 
     Attributes:
         staging: what happens.
+        geometry: what answers questions about its assembly.
         names: names of the parts, in the order of every array here.
         n_steps: the last time.
         where: uint8 (n_steps + 1, n_parts): `ABSENT`, `IN_PLACE` or `APART` at each whole time.
@@ -45,8 +47,10 @@ class Timeline:
         backwards: whether the film is that of taking apart, run backwards.
     """
 
-    def __init__(self, staging: Staging) -> None:
+    def __init__(self, staging: Staging, geometry: AssemblyGeometry | None = None) -> None:
         self.staging = staging
+        known = geometry is not None and geometry.assembly is staging.assembly
+        self.geometry = geometry if geometry and known else AssemblyGeometry(staging.assembly)
         self.names = staging.assembly.names
         self.n_steps = len(staging.motions)
         self.backwards = bool(staging.motions) and all(m.arrives for m in staging.motions)
@@ -79,7 +83,7 @@ class Timeline:
     @cached_property
     def bounds_at_rest(self) -> Array:
         """float64 (n_parts, 2, 3): bounds of the parts, in the work."""
-        return part_bounds(self.staging.assembly)
+        return self.staging.assembly.part_bounds
 
     @cached_property
     def centres(self) -> Array:
@@ -193,14 +197,6 @@ class Timeline:
         return float(boxes[:, 1, 2].max() + 0.6 * np.ptp(boxes[..., 2], axis=1).max())
 
 
-def part_bounds(assembly: Assembly) -> Array:
-    """float64 (n_parts, 2, 3): bounds of the parts at rest, in the world."""
-    low, high = np.full((len(assembly), 3), np.inf), np.full((len(assembly), 3), -np.inf)
-    np.minimum.at(low, assembly.owners, assembly.body_bounds[:, 0])
-    np.maximum.at(high, assembly.owners, assembly.body_bounds[:, 1])
-    return np.stack([low, high], axis=1)
-
-
 def floor_of(assembly: Assembly) -> float:
     """Height (z) of the table, or of the lowest point where there is no table."""
     return assembly.ground if assembly.has_table else float(assembly.bounds[0, 2])
@@ -215,7 +211,7 @@ def _rows_before(assembly: Assembly, groups: Sequence[NDArray[np.int64]], backwa
     shifts = np.zeros((len(groups), 3))
     if not len(groups):
         return shifts
-    boxes = part_bounds(assembly)
+    boxes = assembly.part_bounds
     low = np.array([boxes[g, 0].min(axis=0) for g in groups])
     size = np.array([boxes[g, 1].max(axis=0) for g in groups]) - low
     gap = GAP * float(np.median(size[:, :2]))

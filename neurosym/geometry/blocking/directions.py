@@ -1,22 +1,21 @@
-"""Directions of translation: along axes, from contacts, sampled, given."""
+"""Directions of translation to try: along axes, from contacts, sampled, or given."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterable
+from functools import partial
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from neurosym.errors import InputError
-from neurosym.geometry.shapes import Box
-
-if TYPE_CHECKING:
-    from neurosym.geometry.assembly import Assembly
-
-Array = NDArray[np.float64]
+from neurosym.geometry.assembly import Assembly
+from neurosym.geometry.contact.contacts import Contact, find_contacts
+from neurosym.geometry.contact.surfaces import BodySurfaces
+from neurosym.support.arrays import Array, Numbers
 
 #: What a user may say: "axes", "contacts", a number of samples, text such as "+z,-x", vectors (k, 3), or None for axes.
 Directions = str | int | ArrayLike | None
@@ -28,7 +27,9 @@ MOST = 1_000
 SAME = 1e-3
 
 
-def directions_for(assembly: Assembly, spec: Directions = None) -> Array:
+def directions_for(
+    assembly: Assembly, spec: Directions = None, *, from_contacts: Callable[[], Array] | None = None
+) -> Array:
     """Unit vectors, float64 (k, 3), in the order in which they are to be tried.
 
     Args:
@@ -36,14 +37,17 @@ def directions_for(assembly: Assembly, spec: Directions = None) -> Array:
         spec: None or "axes" (`Assembly.axes`, the most upward first); "contacts" (`contact_directions`); a number k
             (that many, spread evenly over the sphere); "+z" or "-x"; several of these in one text, with commas
             between; or vectors of shape (k, 3) or (3,).
+        from_contacts: gives `contact_directions` where they are known; None: contacts are looked for.
 
     Raises:
         InputError: anything else, a zero or infinite vector, or no direction at all.
     """
+    if from_contacts is None:
+        from_contacts = partial(_contact_directions_of, assembly)
     if spec is None:
         return assembly.axes
     if isinstance(spec, str):
-        return _distinct(np.concatenate([_word(assembly, word.strip()) for word in spec.split(",")]))
+        return _distinct(np.concatenate([_word(assembly, word.strip(), from_contacts) for word in spec.split(",")]))
     if isinstance(spec, (int, np.integer)) and not isinstance(spec, bool):
         return sampled_directions(int(spec))
     try:
@@ -55,36 +59,23 @@ def directions_for(assembly: Assembly, spec: Directions = None) -> Array:
     lengths = np.linalg.norm(vectors, axis=1)
     if not np.isfinite(lengths).all() or not lengths.all():
         raise InputError(f"Expected directions as non-zero vectors of shape (k, 3); got {vectors.tolist()}.")
-    found: Array = vectors / lengths[:, None]
-    return found
+    unit: Array = vectors / lengths[:, None]
+    return unit
 
 
 _WORDS = '"axes", "contacts", a number, or axes such as "+z,-x"'
 
 
-def _word(assembly: Assembly, word: str) -> Array:
+def _word(assembly: Assembly, word: str, from_contacts: Callable[[], Array]) -> Array:
     if word == "axes":
         return assembly.axes
     if word == "contacts":
-        return assembly.contact_directions()
+        return from_contacts()
     if word.isdecimal():
         return sampled_directions(int(word))
     if len(word) == 2 and word[0] in "+-" and word[1] in "xyz":
         return np.eye(3)[["xyz".index(word[1])]] * (1.0 if word[0] == "+" else -1.0)
     raise InputError(f"Expected directions as {_WORDS}; got {word!r}.")
-
-
-def built_axes(assembly: Assembly) -> Array:
-    """The axes of the assembly's boxes and the vertical, as `Assembly.axes` keeps them."""
-    found = [np.array([0.0, 0.0, 1.0])]
-    rotations = [X[:3, :3].T for X, b in zip(assembly.X_WB, assembly.bodies) if isinstance(b.shape, Box)]
-    candidates = np.concatenate(rotations) if rotations else np.eye(3)
-    for axis in np.unique(np.round(candidates, 9), axis=0):
-        if all(np.linalg.norm(np.cross(axis, other)) > assembly.tolerances.parallel for other in found):
-            found.append(axis / np.linalg.norm(axis))
-    both = np.array([s * a for a in found for s in (1.0, -1.0)])
-    both[np.abs(both) < 1e-12] = 0.0
-    return both[np.lexsort((-both[:, 0], -both[:, 1], -both[:, 2].round(9)))]
 
 
 def sampled_directions(count: int) -> Array:
@@ -101,7 +92,7 @@ def sampled_directions(count: int) -> Array:
     return np.stack([radius * np.cos(turn), radius * np.sin(turn), z], axis=1)
 
 
-def contact_directions(assembly: Assembly, most: int = 200) -> Array:
+def contact_directions(assembly: Assembly, contacts: Iterable[Contact], most: int = 200) -> Array:
     """Directions in which contacts let some part slide or lift off, float64 (k, 3), k <= `most`.
 
     A contact with outward unit normal n lets its part move along d when d . n <= 0, so all contacts of a part make a
@@ -114,7 +105,7 @@ def contact_directions(assembly: Assembly, most: int = 200) -> Array:
     pairs of its contacts are kept for parts whose cone is empty.
     """
     found: list[Array] = []
-    for normals in _contact_normals(assembly):
+    for normals in _contact_normals(assembly, contacts):
         if not len(normals):
             continue
         i, j = np.triu_indices(len(normals), 1)
@@ -136,10 +127,14 @@ def contact_directions(assembly: Assembly, most: int = 200) -> Array:
     return distinct[order[:most]]
 
 
-def _contact_normals(assembly: Assembly) -> list[Array]:
+def _contact_directions_of(assembly: Assembly) -> Array:
+    return contact_directions(assembly, find_contacts(assembly, BodySurfaces(assembly.bodies)))
+
+
+def _contact_normals(assembly: Assembly, contacts: Iterable[Contact]) -> list[Array]:
     """Per part, its distinct outward contact normals, float64 (k, 3)."""
     normals: list[list[Array]] = [[] for _ in assembly.parts]
-    for contact in assembly.contacts():
+    for contact in contacts:
         normals[assembly.owners[contact.a]].append(contact.normal)
         if contact.b >= 0:
             normals[assembly.owners[contact.b]].append(-contact.normal)
@@ -151,7 +146,7 @@ def _distinct(vectors: Array) -> Array:
     return _counted(vectors)[0]
 
 
-def _counted(vectors: Array) -> tuple[Array, NDArray[np.int64]]:
+def _counted(vectors: Array) -> tuple[Array, Numbers]:
     """Distinct unit vectors, in order of first appearance, and how often each comes."""
     count = len(vectors)
     if not count:

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import networkx as nx
 
 from neurosym.errors import InputError
-from neurosym.geometry.assembly import Assembly
-from neurosym.geometry.blocking.directions import Directions
-from neurosym.geometry.contact.contacts import TABLE
+from neurosym.geometry.blocking.graph import BlockingGraph
+from neurosym.geometry.contact.contacts import TABLE, Contact, areas_between
 from neurosym.geometry.step_motion import GROUND
 from neurosym.support.files import write_text
 
@@ -19,13 +18,14 @@ from neurosym.support.files import write_text
 SCHEMA = 1
 
 
-def assembly_graph(assembly: Assembly, directions: Directions = None) -> nx.MultiDiGraph:
+def assembly_graph(blocking: BlockingGraph, contacts: Iterable[Contact]) -> nx.MultiDiGraph:
     """Nodes are parts (``fixed``), and the ground where there is one (``ground``). Edges are of two kinds:
 
     * ``kind="blocks"``: the first, moved along ``direction`` (in words; its numbers are ``x``, ``y``, ``z``), hits the
       second.
     * ``kind="touches"``: a contact of so much ``area``, once a pair, and an edge either way is meant.
     """
+    assembly = blocking.assembly
     graph = nx.MultiDiGraph(units=assembly.units or "")
     for name in assembly.names:
         graph.add_node(name, fixed=name in assembly.fixed, ground=False)
@@ -33,7 +33,6 @@ def assembly_graph(assembly: Assembly, directions: Directions = None) -> nx.Mult
         if GROUND in assembly.index:
             raise InputError(f"Expected no part of the name {GROUND!r}, which stands for the ground. Rename it.")
         graph.add_node(GROUND, fixed=True, ground=True)
-    blocking = assembly.blocking(directions)
     for d, (x, y, z) in enumerate(blocking.vectors):
         said = {"kind": "blocks", "direction": blocking.describe(d), "x": x, "y": y, "z": z}
         for part, mask in enumerate(blocking.by_part[d]):
@@ -41,14 +40,9 @@ def assembly_graph(assembly: Assembly, directions: Directions = None) -> nx.Mult
                 graph.add_edge(assembly.names[part], other, **said)
             if blocking.into_table[d]:
                 graph.add_edge(assembly.names[part], GROUND, **said)
-    areas: dict[tuple[str, str], float] = {}
-    for contact in assembly.contacts():
-        a = assembly.names[assembly.owners[contact.a]]
-        b = GROUND if contact.b == TABLE else assembly.names[assembly.owners[contact.b]]
-        pair = (b, a) if (b, a) in areas else (a, b)
-        areas[pair] = areas.get(pair, 0.0) + contact.area
-    for (a, b), area in areas.items():
-        graph.add_edge(a, b, kind="touches", area=area)
+    for (a, b), areas in areas_between(assembly, contacts).items():
+        other = GROUND if b == TABLE else assembly.names[b]
+        graph.add_edge(assembly.names[a], other, kind="touches", area=sum(areas))
     return graph
 
 

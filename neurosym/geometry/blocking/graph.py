@@ -7,63 +7,76 @@ and body by body; every later question about a subset of the parts is bit arithm
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from functools import cached_property
 
 import networkx as nx
 import numpy as np
-from numpy.typing import NDArray
 
-from neurosym.geometry.blocking.sweep import Sweep
+from neurosym.geometry.blocking.stepping import hits_along
+from neurosym.geometry.blocking.sweep import Hits, Sweeps
 from neurosym.geometry.step_motion import Vector
+from neurosym.support.arrays import Array
 from neurosym.support.bitsets import bits, bitsets
 from neurosym.support.words import in_words
-
-if TYPE_CHECKING:
-    from neurosym.geometry.assembly import Assembly
-
-Array = NDArray[np.float64]
 
 
 class BlockingGraph:
     """Blocking of an assembly in k directions.
 
-    Attributes:
+    Args:
+        sweeps: of the assembly.
         directions: float64 (k, 3), unit vectors.
-        by_body: by_body[d][i] is a bitset of the bodies that body i hits when it moves along direction d.
-        by_part: the same for parts: what any body of the part hits, the part itself left out.
+        tabulate: whether all pairs are asked at once. Otherwise each question is asked anew (`hits_along`).
+
+    Attributes:
+        directions, vectors: the directions, as an array and as tuples.
         into_table: bool (k,): whether a motion along the direction would run into the table.
-        queries: pairs of bodies put to the exact test, after the filter by swept bounds.
     """
 
-    def __init__(self, assembly: Assembly, directions: Array) -> None:
-        self.assembly = assembly
+    def __init__(self, sweeps: Sweeps, directions: Array, *, tabulate: bool = True) -> None:
+        self.sweeps, self.assembly, self.names = sweeps, sweeps.assembly, sweeps.assembly.names
         self.directions = directions
-        self.vectors: list[Vector] = [(float(x), float(y), float(z)) for x, y, z in self.directions]
-        self.names = assembly.names
-        self.into_table = (self.directions[:, 2] < -assembly.tolerances.parallel) & assembly.has_table
-        self.queries = 0
-        self.by_body: list[list[int]] = []
-        self.by_part: list[list[int]] = []
-        sweeps: list[Sweep] = []
+        self.vectors: list[Vector] = [(x, y, z) for x, y, z in directions.tolist()]
+        self.into_table = (directions[:, 2] < -self.assembly.tolerances.parallel) & self.assembly.has_table
+        self._table = self.by_part if tabulate else None
+
+    @cached_property
+    def _hits(self) -> list[Hits]:
+        along: list[Hits] = []
         for d, direction in enumerate(self.directions):
             opposite = np.flatnonzero(np.linalg.norm(self.directions[:d] + direction, axis=1) < 1e-12)
             # What hits what going one way is hit by it going the other.
-            sweep = sweeps[opposite[0]].reversed() if len(opposite) else Sweep.along(assembly, direction)
-            sweeps.append(sweep)
-            self.queries += sweep.queries
-            self.by_body.append(bitsets(sweep.hits, len(assembly.bodies)))
-            self.by_part.append(bitsets(assembly.owners[sweep.hits], len(assembly)))
+            along.append(along[opposite[0]].reversed() if len(opposite) else self.sweeps.along(direction))
+        return along
+
+    @cached_property
+    def by_body(self) -> list[list[int]]:
+        """by_body[d][i] is a bitset of the bodies that body i hits when it moves along direction d."""
+        return [bitsets(hits.pairs, len(self.assembly.bodies)) for hits in self._hits]
+
+    @cached_property
+    def by_part(self) -> list[list[int]]:
+        """The same for parts: what any body of the part hits, the part itself left out."""
+        return [bitsets(self.assembly.owners[hits.pairs], len(self.names)) for hits in self._hits]
+
+    @property
+    def queries(self) -> int:
+        """Pairs of bodies put to the exact test, after the filter by swept bounds."""
+        return sum(hits.queries for hits in self._hits)
 
     def blockers(self, part: int, direction: int, among: int) -> int:
         """Bitset of those parts in `among` that part number `part` would hit along direction number `direction`."""
-        return self.by_part[direction][part] & among & ~(1 << part)
+        others = among & ~(1 << part)
+        if self._table is None:
+            return hits_along(self.sweeps, part, self.directions[direction], others)
+        return self._table[direction][part] & others
 
     def group_blockers(self, group: int, direction: int, among: int) -> int:
         """The same for a group of parts (a bitset) that leaves together."""
-        hit = 0
+        rest, hit = among & ~group, 0
         for part in bits(group):
-            hit |= self.by_part[direction][part]
-        return hit & among & ~group
+            hit |= self.blockers(part, direction, rest)
+        return hit
 
     def free_directions(self, part: int, among: int, *, table: bool = True) -> list[int]:
         """Numbers of the directions along which a part can leave the parts in `among` (and the table).
@@ -78,19 +91,31 @@ class BlockingGraph:
             if not (table and self.into_table[d]) and not self.blockers(part, d, among)
         ]
 
-    def carried(self, group: int, direction: int, among: int) -> int:
+    def carried(self, group: int, direction: int, among: int, *, backwards: bool = False) -> int:
         """Bitset of all parts in `among` that move when the parts in `group` move along a direction, `group` too.
 
-        What is hit is pushed along, and hits in turn: the closure of `group` under blocking.
+        What is hit is pushed along, and hits in turn: the closure of `group` under blocking. Backwards: all that cannot
+        move along the direction while `group` stays.
         """
+        rows = None if self._table is None else (self._hit_by if backwards else self._table)[direction]
         moving = waiting = group & among
         while waiting:
-            hit = 0
-            for part in bits(waiting):
-                hit |= self.by_part[direction][part]
-            waiting = hit & among & ~moving
+            rest, hit = among & ~moving, 0
+            if rows is not None:
+                for part in bits(waiting):
+                    hit |= rows[part]
+            elif backwards:
+                hit = sum(1 << part for part in bits(rest) if self.blockers(part, direction, waiting))
+            else:
+                hit = self.group_blockers(waiting, direction, rest)
+            waiting = hit & rest
             moving |= waiting
         return moving
+
+    @cached_property
+    def _hit_by(self) -> list[list[int]]:
+        """by_part the other way: which parts hit each."""
+        return [bitsets(self.assembly.owners[hits.pairs[:, ::-1]], len(self.names)) for hits in self._hits]
 
     def leaving_group(self, part: int, direction: int, among: int, *, table: bool = True) -> int:
         """Bitset of the smallest group that holds a part and can leave the rest of `among` along a direction.

@@ -12,14 +12,10 @@ from typing import Any
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
 from neurosym.geometry.contact.surfaces import GRID, Surfaces
-from neurosym.geometry.mesh.broad_phase import Pairs, spans
-
-Array = NDArray[np.float64]
-Numbers = NDArray[np.int64]
-Truths = NDArray[np.bool_]
+from neurosym.geometry.mesh.broad_phase import spans
+from neurosym.support.arrays import Array, Numbers, Truths
 
 #: So many pairs of triangles are held at a time, so many patches clipped, and so many triangles put to a tree.
 _AT_A_TIME = 400_000
@@ -91,7 +87,7 @@ class Shadows:
         return found
 
 
-def shadows_hit(shadows: Shadows, pairs: Pairs, apart: Array, touch: float, tries: Array | None = None) -> Truths:
+def shadows_hit(shadows: Shadows, pairs: Numbers, apart: Array, touch: float, tries: Array | None = None) -> Truths:
     """Whether body a, moved along the direction without end, hits body b, bool (k,).
 
     Args:
@@ -138,7 +134,7 @@ def _patches(shadows: Shadows, i: Numbers, j: Numbers, apart: Array, touch: floa
     return wide & deep, deep, patches
 
 
-def _stacked_over(shadows: Shadows, pairs: Pairs, apart: Array, at: Array) -> tuple[Numbers, Numbers, Numbers]:
+def _stacked_over(shadows: Shadows, pairs: Numbers, apart: Array, at: Array) -> tuple[Numbers, Numbers, Numbers]:
     """For pairs: the lowest lower face of a, and the highest upper face of b, over a point; pairs without are left out.
 
     Returns the pair, the triangle of a and the triangle of b, int64 (n,) each.
@@ -173,7 +169,7 @@ def _stacked_over(shadows: Shadows, pairs: Pairs, apart: Array, at: Array) -> tu
 
 
 def _meeting(
-    shadows: Shadows, pairs: Pairs, asked: Numbers, apart: Array, touch: float, hit: Truths
+    shadows: Shadows, pairs: Numbers, asked: Numbers, apart: Array, touch: float, hit: Truths
 ) -> Iterator[tuple[Numbers, Numbers, Numbers]]:
     """Triangles of the asked pairs whose bounds overlap, a batch at a time; pairs hit meanwhile are skipped."""
     for pair, i, j in _products(shadows, pairs, asked):
@@ -187,7 +183,7 @@ def _meeting(
                 yield pair[some], i[some], j[some]
 
 
-def _products(shadows: Shadows, pairs: Pairs, asked: Numbers) -> Iterator[tuple[Numbers, Numbers, Numbers]]:
+def _products(shadows: Shadows, pairs: Numbers, asked: Numbers) -> Iterator[tuple[Numbers, Numbers, Numbers]]:
     """Lower faces of a with upper faces of b: each with each where they are few, by a tree of bounds where many."""
     a, b = pairs[asked].T
     lowers = shadows.first_lower[a + 1] - shadows.first_lower[a]

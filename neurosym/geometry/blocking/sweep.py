@@ -14,66 +14,79 @@ resort:
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from functools import cached_property
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from neurosym.geometry.assembly import Box
-from neurosym.geometry.blocking.rest_overlaps import RestOverlaps
+from neurosym.geometry.assembly import Assembly
+from neurosym.geometry.blocking.mating_overlaps import MatingOverlaps, mating_overlaps
 from neurosym.geometry.blocking.shadows import Shadows, shadows_hit
-from neurosym.geometry.contact import collision
-from neurosym.geometry.contact.contacts import plane_axes
-from neurosym.geometry.contact.surfaces import GRID, Surfaces, facet_distances
-from neurosym.geometry.mesh.broad_phase import Pairs, overlapping_pairs, spans
-
-if TYPE_CHECKING:
-    from neurosym.geometry.assembly import Assembly
-
-Array = NDArray[np.float64]
-Numbers = NDArray[np.int64]
-Truths = NDArray[np.bool_]
+from neurosym.geometry.contact.surfaces import GRID, BodySurfaces, facet_distances
+from neurosym.geometry.mesh.broad_phase import overlapping_pairs, spans
+from neurosym.geometry.mesh.triangles import plane_axes
+from neurosym.support.arrays import Array, Numbers, Truths
 
 
 @dataclass(frozen=True, eq=False)
-class Sweep:
+class Hits:
     """What hits what along one direction.
 
     Attributes:
-        hits: int64 (k, 2): ordered pairs of bodies; the first, moved along the direction, hits the second.
+        pairs: int64 (k, 2): ordered pairs of bodies; the first, moved along the direction, hits the second.
         queries: how many ordered pairs the filter by bounds has left to the closer tests.
     """
 
-    hits: Pairs
+    pairs: Numbers
     queries: int
 
-    @staticmethod
-    def along(assembly: Assembly, direction: Array) -> Sweep:
-        """All pairs of bodies of different parts, along a unit vector (3,)."""
-        return _Sweeper(assembly, direction).sweep()
-
-    def reversed(self) -> Sweep:
+    def reversed(self) -> Hits:
         """The opposite direction, for nothing: what is hit one way hits the other way."""
-        return Sweep(self.hits[:, ::-1], self.queries)
+        return Hits(self.pairs[:, ::-1], self.queries)
 
 
-class _Sweeper:
+class Sweeps:
+    """The bodies of an assembly moved along directions, given as unit vectors (3,)."""
+
+    def __init__(self, assembly: Assembly, surfaces: BodySurfaces) -> None:
+        self.assembly, self.surfaces = assembly, surfaces
+        self._shadows: dict[tuple[float, ...], Shadows] = {}
+
+    @cached_property
+    def mating(self) -> MatingOverlaps:
+        """Pairs that overlap a little where they mate."""
+        return mating_overlaps(self.assembly, self.surfaces.hulls)
+
+    def along(self, direction: Array) -> Hits:
+        """All pairs of bodies of different parts."""
+        return _Sweep(self, direction).hits()
+
+    def triangles_hit(self, pairs: Numbers, direction: Array) -> Truths:
+        """The same for ordered pairs of bodies, int64 (k, 2), by triangles alone: bool (k,)."""
+        frame = np.stack([*plane_axes(direction), direction], axis=1)
+        key = tuple(direction.tolist())
+        if key not in self._shadows:
+            self._shadows[key] = Shadows.of(self.surfaces.exact, frame)
+        return shadows_hit(self._shadows[key], pairs, self.mating.apart(pairs) @ frame, self.assembly.touch)
+
+
+class _Sweep:
     """All bodies seen along one direction."""
 
-    def __init__(self, assembly: Assembly, direction: Array) -> None:
-        self.assembly = assembly
-        self.frame = sweep_frame(assembly, direction)
-        hulls = Surfaces.of_hulls(assembly)
+    def __init__(self, sweeps: Sweeps, direction: Array) -> None:
+        self.assembly, self.surfaces, self.mating = sweeps.assembly, sweeps.surfaces, sweeps.mating
+        self.frame = sweep_frame(self.assembly, direction)
+        hulls = self.surfaces.hulls
         self.points = hulls.vertices @ self.frame
         starts = hulls.first_vertex[:-1]
         self.low = np.minimum.reduceat(self.points, starts)
         self.high = np.maximum.reduceat(self.points, starts)
 
-    def sweep(self) -> Sweep:
+    def hits(self) -> Hits:
         touch, low, high = self.assembly.touch, self.low, self.high
         pairs = overlapping_pairs(low[:, :2] + touch / 2, high[:, :2] - touch / 2, self.assembly.owners)
-        apart = RestOverlaps.of(self.assembly).apart(pairs) @ self.frame
+        apart = self.mating.apart(pairs) @ self.frame
         # Both ways round: the first of a pair is what moves.
         pairs, apart = np.concatenate([pairs, pairs[:, ::-1]]), np.concatenate([apart, -apart])
         a, b = pairs.T
@@ -83,15 +96,15 @@ class _Sweeper:
         pairs, apart = pairs[ahead], apart[ahead]
         hit = _aligned(self.assembly, self.frame)[pairs].all(axis=1)
         hit[~hit] = self._by_hulls(pairs[~hit], apart[~hit])
-        return Sweep(pairs[hit], len(pairs))
+        return Hits(pairs[hit], len(pairs))
 
-    def _by_hulls(self, pairs: Pairs, apart: Array) -> Truths:
+    def _by_hulls(self, pairs: Numbers, apart: Array) -> Truths:
         """Whether the first of each pair hits the second: convex hulls decide what they can, triangles the rest."""
         hit = np.zeros(len(pairs), dtype=bool)
         if not len(pairs):
             return hit
         touch = self.assembly.touch
-        hulls = Surfaces.of_hulls(self.assembly)
+        hulls = self.surfaces.hulls
         bodies = np.unique(pairs)
         number = np.zeros(len(self.assembly.bodies), dtype=np.int64)
         number[bodies] = np.arange(len(bodies))
@@ -107,7 +120,7 @@ class _Sweeper:
         depth = seen.top(pairs[open_, 1], middle - apart[open_, :2]) + apart[open_, 2]
         depth -= seen.bottom(pairs[open_, 0], middle)
         deep = depth > touch
-        convex = self.assembly.is_convex[pairs[open_]].all(axis=1)
+        convex = self.assembly.bodies.is_convex[pairs[open_]].all(axis=1)
         hit[open_[deep & convex]] = True
         # A facet between the two of which a moves away.
         shallow = open_[~deep]
@@ -116,13 +129,14 @@ class _Sweeper:
         left = ~hit[open_] & ~between[open_]
         asked = open_[left]
         if len(asked):
-            surfaces = seen if self.assembly.is_convex.all() else Shadows.of(Surfaces.of(self.assembly), self.frame)
-            hit[asked] = shadows_hit(surfaces, pairs[asked], apart[asked], touch, middle[left])
+            exact = self.surfaces.exact
+            shadows = seen if exact is hulls else Shadows.of(exact, self.frame)
+            hit[asked] = shadows_hit(shadows, pairs[asked], apart[asked], touch, middle[left])
         return hit
 
-    def _separated(self, pairs: Pairs, apart: Array) -> Truths:
+    def _separated(self, pairs: Numbers, apart: Array) -> Truths:
         """Whether a facet of either hull has the other on its outer side, and the first of the pair moves off it."""
-        hulls = Surfaces.of_hulls(self.assembly)
+        hulls = self.surfaces.hulls
         along = hulls.normals @ self.frame[:, 2]
         world = apart @ self.frame.T
         found = np.zeros(len(pairs), dtype=bool)
@@ -147,7 +161,7 @@ def _moved(shapes: NDArray[np.object_], offsets: Array) -> NDArray[np.object_]:
 
 def sweep_frame(assembly: Assembly, direction: Array) -> Array:
     """A rotation (3, 3) with the direction last; the others along the axes of most boxes that have one along it."""
-    axes = np.swapaxes(assembly.X_WB[assembly.is_box, :3, :3], 1, 2).reshape(-1, 3)
+    axes = np.swapaxes(assembly.X_WB[assembly.bodies.is_box, :3, :3], 1, 2).reshape(-1, 3)
     along = axes @ direction
     turned = np.abs(along) >= np.sqrt(1 - assembly.tolerances.parallel**2)
     boxes, place = np.divmod(np.flatnonzero(turned), 3)
@@ -166,96 +180,5 @@ def sweep_frame(assembly: Assembly, direction: Array) -> Array:
 def _aligned(assembly: Assembly, frame: Array) -> Truths:
     """Which bodies are boxes along the axes of a frame, bool (n_bodies,)."""
     sines = np.sort(np.abs(np.swapaxes(assembly.X_WB[:, :3, :3], 1, 2) @ frame), axis=2)[:, :, :2]
-    found: Truths = assembly.is_box & (np.linalg.norm(sines, axis=2).max(axis=1) <= assembly.tolerances.parallel)
+    found: Truths = assembly.bodies.is_box & (np.linalg.norm(sines, axis=2).max(axis=1) <= assembly.tolerances.parallel)
     return found
-
-
-def triangles_block(assembly: Assembly, a: int, b: int, direction: Array) -> bool:
-    """Whether body `a`, moved along a unit vector (3,) without end, hits body `b`, by triangles alone."""
-    return bool(triangles_hit(assembly, np.array([[a, b]]), direction)[0])
-
-
-def triangles_hit(assembly: Assembly, pairs: Pairs, direction: Array) -> Truths:
-    """The same for ordered pairs of bodies, int64 (k, 2): bool (k,)."""
-    frame = np.stack([*plane_axes(direction), direction], axis=1)
-    shadows = assembly.remember(
-        f"shadows {direction.tobytes().hex()}", lambda: Shadows.of(Surfaces.of(assembly), frame)
-    )
-    return shadows_hit(shadows, pairs, _apart(assembly, pairs) @ frame, assembly.touch)
-
-
-def _apart(assembly: Assembly, pairs: Pairs) -> Array:
-    """By how much the second of each ordered pair is thought moved off the first, float64 (k, 3)."""
-    apart = RestOverlaps.of(assembly).apart(np.sort(pairs, axis=1))
-    apart[pairs[:, 0] > pairs[:, 1]] *= -1
-    return apart
-
-
-def drops_onto(assembly: Assembly, body: int, other: int, X_WO: Array) -> bool:
-    """Whether an upright box, falling, would land on box `other` at pose X_WO (4, 4)."""
-    shape, target = assembly.bodies[body].shape, assembly.bodies[other].shape
-    assert isinstance(shape, Box)
-    assert isinstance(target, Box)
-    pose = assembly.X_WB[body].copy()
-    size = shape.size - 2 * assembly.touch
-    axis = int(np.argmax(np.abs(pose[2, :3])))
-    drop = float(pose[2, 3] - X_WO[2, 3]) + assembly.smallest_extent
-    if drop <= 0:
-        return False
-    size[axis] += drop
-    pose[2, 3] -= drop / 2
-    return collision.collide(collision.box_object(size, pose), collision.box_object(target.size, X_WO))
-
-
-def exits_along(assembly: Assembly, part: int, direction: Array, others: list[int]) -> list[int]:
-    """Which of `others` (numbers of parts) a part hits on its way out along a direction, asked afresh.
-
-    Boxes are moved in steps and put to FCL one by one, shrunk by the touching tolerance: a second way to the
-    answer that shares nothing with swept bounds. For other shapes triangles answer alone, without hulls.
-    """
-    bodies = np.flatnonzero(assembly.owners == part)
-    targets = np.flatnonzero(np.isin(assembly.owners, others))
-    # What is behind, or beside the way, needs no closer look.
-    centre, reach = _spheres(assembly)
-    way = centre[targets][None] - centre[bodies][:, None]
-    forward = way @ direction
-    near = reach[bodies][:, None] + reach[targets][None]
-    ahead = (forward > -near) & (np.linalg.norm(way - forward[..., None] * direction, axis=2) < near)
-    i, j = np.nonzero(ahead)
-    pairs = np.stack([bodies[i], targets[j]], axis=1)
-    boxes = assembly.is_box[pairs].all(axis=1)
-    hits = {int(assembly.owners[b]) for a, b in pairs[~boxes][triangles_hit(assembly, pairs[~boxes], direction)]}
-    for (a, b), apart in zip(pairs[boxes], _apart(assembly, pairs[boxes])):
-        owner = int(assembly.owners[b])
-        if owner not in hits and _meets(assembly, int(a), int(b), direction, apart):
-            hits.add(owner)
-    return sorted(hits)
-
-
-def _spheres(assembly: Assembly) -> tuple[Array, Array]:
-    """A sphere about each body: centres (n_bodies, 3) and radii (n_bodies,)."""
-    low, high = assembly.body_bounds[:, 0], assembly.body_bounds[:, 1]
-    return (low + high) / 2, np.linalg.norm(high - low, axis=1) / 2
-
-
-def _meets(assembly: Assembly, a: int, b: int, direction: Array, apart: Array) -> bool:
-    """Whether box `a`, moved in steps along a direction, meets box `b`, thought moved by `apart` (3,)."""
-    shape_a, shape_b = assembly.bodies[a].shape, assembly.bodies[b].shape
-    assert isinstance(shape_a, Box)
-    assert isinstance(shape_b, Box)
-    first, second = assembly.body_vertices(a) @ direction, assembly.body_vertices(b) @ direction
-    distance = float(second.max() - first.min())
-    if distance <= assembly.touch:
-        return False
-    other = assembly.X_WB[b].copy()
-    other[:3, 3] += apart
-    target = collision.box_object(shape_b.size, other)
-    pose = assembly.X_WB[a].copy()
-    # Half the thinner of the two: no step can jump over the other box. No earlier than where the other begins.
-    step = 0.5 * float(min(shape_a.size.min(), shape_b.size.min()))
-    begin = max(0.0, float(second.min() - first.max()))
-    for travelled in np.arange(begin, distance + step, step):
-        pose[:3, 3] = assembly.X_WB[a][:3, 3] + travelled * direction
-        if collision.collide(collision.box_object(shape_a.size - 2 * assembly.touch, pose), target):
-            return True
-    return False

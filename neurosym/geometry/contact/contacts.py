@@ -8,23 +8,19 @@ handled at once.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
-from neurosym.geometry.contact import collision
-from neurosym.geometry.contact.surfaces import GRID, Surfaces
-from neurosym.geometry.mesh.broad_phase import Pairs, overlapping_pairs, spans
-
-if TYPE_CHECKING:
-    from neurosym.geometry.assembly import Assembly
-
-Array = NDArray[np.float64]
-Numbers = NDArray[np.int64]
+from neurosym.geometry.assembly import Assembly
+from neurosym.geometry.contact.collision import Gaps
+from neurosym.geometry.contact.surfaces import GRID, BodySurfaces, Surfaces
+from neurosym.geometry.mesh.broad_phase import overlapping_pairs, spans
+from neurosym.geometry.mesh.triangles import plane_axes
+from neurosym.support.arrays import Array, Numbers, Truths
 
 #: Stands for the table where a body is expected.
 TABLE = -1
@@ -48,49 +44,44 @@ class Contact:
     area: float
 
 
-def find_contacts(assembly: Assembly) -> tuple[Contact, ...]:
+def find_contacts(assembly: Assembly, surfaces: BodySurfaces) -> tuple[Contact, ...]:
     """All contacts of an assembly, the table's first, then by bodies."""
     bounds, touch = assembly.body_bounds, assembly.touch
     near = overlapping_pairs(bounds[:, 0] - touch, bounds[:, 1] + touch, assembly.owners)
     aligned = _same_axes(assembly, near)
-    found = _box_contacts(assembly, near[aligned])
+    contacts = _box_contacts(assembly, near[aligned])
     others = near[~aligned]
     if len(others):
-        found += _facet_contacts(assembly, others, assembly.tolerances.parallel, touch)
-        done = {(c.a, c.b) for c in found}
+        contacts += _facet_contacts(assembly, surfaces.exact, others, assembly.tolerances.parallel, touch)
+        done = {(c.a, c.b) for c in contacts}
+        gaps = Gaps(assembly.bodies)
         left = [(int(a), int(b)) for a, b in others if (a, b) not in done]
-        rounded = [pair for pair in left if _touching(assembly, *pair)]
-        if rounded:
-            found += _facet_contacts(assembly, np.array(rounded), assembly.tolerances.mate_angle, assembly.mate)
-    return tuple(_table_contacts(assembly) + sorted(found, key=lambda c: (c.a, c.b)))
+        rounded = np.array([pair for pair in left if gaps.between(*pair) <= touch])
+        if len(rounded):
+            angle = assembly.tolerances.mate_angle
+            contacts += _facet_contacts(assembly, surfaces.exact, rounded, angle, assembly.mate)
+    return tuple(_table_contacts(assembly) + sorted(contacts, key=lambda c: (c.a, c.b)))
 
 
-def _touching(assembly: Assembly, a: int, b: int) -> bool:
-    """Whether the surfaces of two bodies come within the touching tolerance, by FCL."""
-    objects = assembly.remember("collision objects", lambda: dict[int, object]())
-    for body in (a, b):
-        if body not in objects:
-            objects[body] = collision.shape_object(assembly.bodies[body].shape, assembly.X_WB[body])
-    first, second = objects[a], objects[b]
-    return collision.collide(first, second) or collision.distance(first, second) <= assembly.touch
+def areas_between(assembly: Assembly, contacts: Iterable[Contact]) -> dict[tuple[int, int], list[float]]:
+    """Numbers of two parts that touch, or of one and `TABLE`, -> the areas of their patches; in the contacts' order."""
+    areas: dict[tuple[int, int], list[float]] = {}
+    for c in contacts:
+        b = TABLE if c.b == TABLE else int(assembly.owners[c.b])
+        areas.setdefault((int(assembly.owners[c.a]), b), []).append(c.area)
+    return areas
 
 
-def near_pairs(bounds: Array, owners: Numbers, margin: float) -> list[tuple[int, int]]:
-    """Pairs a < b of bodies of different parts whose bounds (n, 2, 3) come within `margin`."""
-    pairs = overlapping_pairs(bounds[:, 0] - margin, bounds[:, 1] + margin, owners)
-    return [(int(a), int(b)) for a, b in pairs]
-
-
-def _same_axes(assembly: Assembly, pairs: Pairs) -> NDArray[np.bool_]:
+def _same_axes(assembly: Assembly, pairs: Numbers) -> Truths:
     """Which pairs are two boxes with parallel axes, bool (k,)."""
-    boxes = assembly.is_box[pairs].all(axis=1)
+    boxes = assembly.bodies.is_box[pairs].all(axis=1)
     R = assembly.X_WB[:, :3, :3]
     sines = np.sort(np.abs(np.swapaxes(R[pairs[:, 0]], 1, 2) @ R[pairs[:, 1]]), axis=2)[:, :, :2]
     parallel = np.linalg.norm(sines, axis=2).max(axis=1, initial=0.0) <= assembly.tolerances.parallel
     return np.asarray(boxes & parallel)
 
 
-def _box_contacts(assembly: Assembly, pairs: Pairs) -> list[Contact]:
+def _box_contacts(assembly: Assembly, pairs: Numbers) -> list[Contact]:
     """Contacts of boxes with parallel axes, pairs (k, 2): in the first box's frame all is intervals."""
     if not len(pairs):
         return []
@@ -99,8 +90,8 @@ def _box_contacts(assembly: Assembly, pairs: Pairs) -> list[Contact]:
     X = assembly.X_WB
     R = X[a, :3, :3]
     across = np.swapaxes(R, 1, 2)
-    half_a = assembly.box_sizes[a] / 2
-    half_b = np.einsum("kij,kj->ki", np.abs(across @ X[b, :3, :3]).round(), assembly.box_sizes[b]) / 2
+    half_a = assembly.bodies.box_sizes[a] / 2
+    half_b = np.einsum("kij,kj->ki", np.abs(across @ X[b, :3, :3]).round(), assembly.bodies.box_sizes[b]) / 2
     centre = np.einsum("kij,kj->ki", across, X[b, :3, 3] - X[a, :3, 3])
     low, high = np.maximum(-half_a, centre - half_b), np.minimum(half_a, centre + half_b)
     overlap = high - low
@@ -128,7 +119,7 @@ def _table_contacts(assembly: Assembly) -> list[Contact]:
     reach = assembly.ground + assembly.touch
     found = []
     for i in np.flatnonzero(assembly.body_bounds[:, 0, 2] <= reach):
-        vertices = assembly.body_vertices(int(i))
+        vertices = assembly.bodies.vertices(int(i))
         points = hull_points(vertices[vertices[:, 2] <= reach], down)
         area = _area(points, down)
         if _is_wide(points, area, assembly.touch):
@@ -162,22 +153,15 @@ def hull_points(points: Array, normal: Array) -> Array:
         return points[:0]
 
 
-def plane_axes(normal: Array) -> tuple[Array, Array]:
-    """Two unit vectors (3,) that span the plane across a unit normal."""
-    helper = np.eye(3)[np.argmin(np.abs(normal))]
-    u = np.cross(normal, helper)
-    u /= np.linalg.norm(u)
-    return u, np.cross(normal, u)
-
-
-def _facet_contacts(assembly: Assembly, pairs: Pairs, sine: float, gap: float) -> list[Contact]:
+def _facet_contacts(
+    assembly: Assembly, surfaces: Surfaces, pairs: Numbers, sine: float, gap: float
+) -> list[Contact]:
     """Contacts of bodies by clipping triangles that face one another, all pairs (k, 2) at once.
 
     Args:
         sine: of the angle up to which normals count as opposite.
         gap: how far apart (length) the faces may be; an overlap may be as deep as `tolerances.mate` says.
     """
-    surfaces = Surfaces.of(assembly)
     i, j = _facing(assembly, surfaces, pairs, sine, gap).T
     planes = _planes(assembly, surfaces, i, j, max(sine, 1e-3))
     if not planes:
@@ -188,7 +172,7 @@ def _facet_contacts(assembly: Assembly, pairs: Pairs, sine: float, gap: float) -
     origins = surfaces.middles[i[starts]]
     normals = np.add.reduceat(surfaces.normals[i] - surfaces.normals[j], starts)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    axes = np.array([np.stack(plane_axes(n), axis=1) for n in normals])  # (planes, 3, 2)
+    axes = np.stack(plane_axes(normals), axis=2)  # (planes, 3, 2)
     shadows = [(surfaces.triangles[t] - origins[number][:, None]) @ axes[number] for t in (i, j)]
     clipped = shapely.intersection(*map(shapely.polygons, shadows), grid_size=GRID * assembly.touch)
     areas = shapely.area(clipped)
@@ -215,7 +199,7 @@ def _facet_contacts(assembly: Assembly, pairs: Pairs, sine: float, gap: float) -
     return found
 
 
-def _facing(assembly: Assembly, surfaces: Surfaces, pairs: Pairs, sine: float, gap: float) -> Pairs:
+def _facing(assembly: Assembly, surfaces: Surfaces, pairs: Numbers, sine: float, gap: float) -> Numbers:
     """Pairs of triangles, the first of the lower body, that are near and face each other, int64 (k, 2)."""
     # Only what reaches into the bounds of the other body of a pair can touch it.
     ways = np.concatenate([pairs, pairs[:, ::-1]])

@@ -10,20 +10,17 @@ never too large for others.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from neurosym.geometry.bodies import Bodies
 from neurosym.geometry.mesh import triangles
-
-if TYPE_CHECKING:
-    from neurosym.geometry.assembly import Assembly
-
-Array = NDArray[np.float64]
+from neurosym.geometry.mesh.broad_phase import CHUNK, near_pairs, overlapping_pairs
+from neurosym.support.arrays import Array, Numbers
 
 #: Overlaps below this share of the smallest extent are rounding.
 NOISE = 1e-6
@@ -55,30 +52,24 @@ class Overlap:
     depth: float
 
 
-def overlaps(assembly: Assembly) -> tuple[Overlap, ...]:
-    """All overlaps of bodies of different parts, those between two fixed parts left out."""
-    return tuple(_overlaps(assembly))
-
-
-def _overlaps(assembly: Assembly) -> Iterator[Overlap]:
-    noise = NOISE * assembly.smallest_extent
-    low, high = assembly.body_bounds[:, 0], assembly.body_bounds[:, 1]
+def overlaps(bodies: Bodies, fixed: int = 0) -> list[Overlap]:
+    """All overlaps of bodies of different parts, those between two parts of the bitset `fixed` left out."""
+    noise = NOISE * bodies.smallest_extent
+    low, high = bodies.bounds[:, 0], bodies.bounds[:, 1]
     inner = (np.minimum(low + noise / 2, high), np.maximum(high - noise / 2, low))
-    pairs = triangles.near_pairs(inner, inner, 50 * triangles.CHUNK)
-    if pairs is None:
-        raise MemoryError("too many parts in one place")
-    owners = assembly.owners
-    fixed = np.array([assembly.fixed_mask >> int(o) & 1 for o in owners], dtype=bool)
-    pairs = pairs[(pairs[:, 0] < pairs[:, 1]) & (owners[pairs[:, 0]] != owners[pairs[:, 1]])]
-    pairs = pairs[~fixed[pairs].all(axis=1)]
-    bodies = {int(i): _Body.of(assembly, int(i)) for i in np.unique(pairs)}
+    rests = np.array([fixed >> o & 1 for o in bodies.owners.tolist()], dtype=bool)
+    pairs = overlapping_pairs(*inner, bodies.owners)
+    pairs = pairs[~rests[pairs].all(axis=1)]
+    surfaces = {int(i): _Body.of(bodies, int(i)) for i in np.unique(pairs)}
+    deep = []
     for i, j in pairs:
-        a, b = bodies[int(i)], bodies[int(j)]
+        a, b = surfaces[int(i)], surfaces[int(j)]
         reach = _least_width(a, b)
         if reach > noise:
-            depth = min(_depth(a, b, noise, FAR * assembly.smallest_extent), reach)
+            depth = min(_depth(a, b, noise, FAR * bodies.smallest_extent), reach)
             if depth > noise:
-                yield Overlap(int(i), int(j), depth)
+                deep.append(Overlap(int(i), int(j), depth))
+    return deep
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,10 +81,10 @@ class _Body:
     normals: Array
 
     @classmethod
-    def of(cls, assembly: Assembly, body: int) -> _Body:
-        vertices = assembly.body_vertices(body)
-        t = vertices[assembly.bodies[body].shape.faces]
-        cross = np.cross(t[:, 1] - t[:, 0], t[:, 2] - t[:, 0])
+    def of(cls, bodies: Bodies, body: int) -> _Body:
+        vertices = bodies.vertices(body)
+        t = vertices[bodies[body].shape.faces]
+        cross = triangles.area_vectors(t)
         size = np.linalg.norm(cross, axis=1)
         kept = size > 1e-12 * np.ptp(vertices) ** 2
         return cls(vertices, t[kept], cross[kept] / size[kept, None])
@@ -165,20 +156,20 @@ def _deepest(points: Array, surfaces: list[Array], near: list[Array], noise: flo
     return away if away > noise else 0.0
 
 
-def _near_faces(a: _Body, b: _Body, far: float) -> NDArray[np.int64]:
+def _near_faces(a: _Body, b: _Body, far: float) -> Numbers:
     """Pairs (k, 2) of faces of two bodies that look at one another from no farther than `far`, or close to it."""
     low, high = triangles.bounds(a.triangles)
     rows, pairs = np.arange(len(low)), None
     while pairs is None:
         around = (low[rows] - far, high[rows] + far)
-        pairs = triangles.near_pairs(around, triangles.bounds(b.triangles), triangles.CHUNK)
+        pairs = near_pairs(around, triangles.bounds(b.triangles), CHUNK)
         rows = rows if pairs is not None else rows[::2]
     pairs[:, 0] = rows[pairs[:, 0]]
     facing = np.einsum("kd,kd->k", a.normals[pairs[:, 0]], b.normals[pairs[:, 1]]) < _FACING
     return np.asarray(pairs[facing])
 
 
-def _between(a: _Body, b: _Body, pairs: NDArray[np.int64], middle: Array, noise: float) -> Array:
+def _between(a: _Body, b: _Body, pairs: Numbers, middle: Array, noise: float) -> Array:
     """Points (n, 3), from `middle`, halfway between those pairs (k, 2) of faces that have passed one another."""
     i, j = pairs.T
     # Passed: each face has some corner beyond the other's plane.
@@ -190,9 +181,7 @@ def _between(a: _Body, b: _Body, pairs: NDArray[np.int64], middle: Array, noise:
     # Each pair of faces is looked at along the mean of its two normals: n, with u and v across.
     n = na - nb
     n /= np.linalg.norm(n, axis=1, keepdims=True)
-    u = np.cross(n, np.eye(3)[np.abs(n).argmin(axis=1)])
-    u /= np.linalg.norm(u, axis=1, keepdims=True)
-    axes = np.stack([u, np.cross(n, u)], axis=2)
+    axes = np.stack(triangles.plane_axes(n), axis=2)
     patches = shapely.intersection(shapely.polygons(ta @ axes), shapely.polygons(tb @ axes))
     wide = np.flatnonzero(shapely.area(patches) > 0)
     uv, patch = _spots(patches[wide])
@@ -217,7 +206,7 @@ def _amid(a: _Body, b: _Body, noise: float) -> Array:
         # Each edge belongs to two faces, and is gone along once either way.
         edges = edges[(edges[:, 0] < edges[:, 1]).argmax(axis=1) == (edges[:, 0] != edges[:, 1]).argmax(axis=1)]
         around = (edges.min(axis=1), edges.max(axis=1))
-        pairs = triangles.near_pairs(around, triangles.bounds(other.triangles), triangles.CHUNK)
+        pairs = near_pairs(around, triangles.bounds(other.triangles), CHUNK)
         if pairs is not None and len(pairs):
             i, j = pairs.T
             through, where = triangles.pierced(edges[i], other.triangles[j], other.normals[j], noise / 2)
@@ -228,7 +217,7 @@ def _amid(a: _Body, b: _Body, noise: float) -> Array:
     return halfway
 
 
-def _spots(patches: NDArray[np.object_]) -> tuple[Array, NDArray[np.int64]]:
+def _spots(patches: NDArray[np.object_]) -> tuple[Array, Numbers]:
     """Points (n, 2) of convex patches at which a gap may be widest, and the patch of each: centres, corners, edges."""
     corners, patch = shapely.get_coordinates(shapely.get_exterior_ring(patches), return_index=True)
     same = patch[1:] == patch[:-1]

@@ -5,19 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
-from neurosym.geometry.mesh.broad_phase import Pairs, spans
-
-if TYPE_CHECKING:
-    from neurosym.geometry.assembly import Assembly
-
-Array = NDArray[np.float64]
-Numbers = NDArray[np.int64]
+from neurosym.geometry.bodies import Bodies
+from neurosym.geometry.mesh.broad_phase import spans
+from neurosym.geometry.mesh.triangles import area_vectors
+from neurosym.support.arrays import Array, Numbers
 
 #: So many pairs of a facet and a vertex are held at a time.
 _AT_A_TIME = 2_000_000
@@ -46,16 +41,6 @@ class Surfaces:
     vertices: Array
     first_vertex: Numbers
 
-    @staticmethod
-    def of(assembly: Assembly) -> Surfaces:
-        """The surfaces of an assembly's bodies as they are."""
-        return assembly.remember("surfaces", lambda: _surfaces(assembly, hulls=False))
-
-    @staticmethod
-    def of_hulls(assembly: Assembly) -> Surfaces:
-        """The surfaces of the bodies' convex hulls."""
-        return assembly.remember("hull surfaces", lambda: _surfaces(assembly, hulls=True))
-
     @cached_property
     def middles(self) -> Array:
         """float64 (m, 3): centroids of the triangles."""
@@ -63,26 +48,47 @@ class Surfaces:
         return middles
 
 
-def _surfaces(assembly: Assembly, *, hulls: bool) -> Surfaces:
-    vertices = [assembly.body_vertices(b) for b in range(len(assembly.bodies))]
-    faces = [np.asarray(b.shape.faces) for b in assembly.bodies]
-    if hulls:
-        for b in np.flatnonzero(~assembly.is_convex):
+class BodySurfaces:
+    """The surfaces of bodies, each kind made when first asked for."""
+
+    def __init__(self, bodies: Bodies) -> None:
+        self.bodies = bodies
+
+    @cached_property
+    def exact(self) -> Surfaces:
+        """The bodies as they are."""
+        return _surfaces(*self._meshes())
+
+    @cached_property
+    def hulls(self) -> Surfaces:
+        """Their convex hulls."""
+        if self.bodies.is_convex.all():
+            return self.exact
+        vertices, faces = self._meshes()
+        for b in np.flatnonzero(~self.bodies.is_convex):
             # The corners of a hull's facets come in either order: its planes say which is outward.
             hull = ConvexHull(vertices[b])
             kept = hull.vertices
             number = np.zeros(len(vertices[b]), dtype=np.int64)
             number[kept] = np.arange(len(kept))
             t = vertices[b][hull.simplices]
-            outward = np.einsum("nd,nd->n", np.cross(t[:, 1] - t[:, 0], t[:, 2] - t[:, 0]), hull.equations[:, :3]) > 0
+            outward = np.einsum("nd,nd->n", area_vectors(t), hull.equations[:, :3]) > 0
             faces[b] = np.where(outward[:, None], number[hull.simplices], number[hull.simplices[:, ::-1]])
             vertices[b] = vertices[b][kept]
+        return _surfaces(vertices, faces)
+
+    def _meshes(self) -> tuple[list[Array], list[Numbers]]:
+        vertices = [self.bodies.vertices(b) for b in range(len(self.bodies))]
+        return vertices, [np.asarray(b.shape.faces) for b in self.bodies]
+
+
+def _surfaces(vertices: list[Array], faces: list[Numbers]) -> Surfaces:
     counts = np.array([len(f) for f in faces])
     first_vertex = np.concatenate([[0], np.cumsum([len(v) for v in vertices])])
     points = np.concatenate(vertices)
     corners = np.concatenate(faces) + np.repeat(first_vertex[:-1], counts)[:, None]
     triangles = points[corners]
-    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    normals = area_vectors(triangles)
     sizes = np.linalg.norm(normals, axis=1)
     body = np.repeat(np.arange(len(faces)), counts)
     # Needles and points have no normal to speak of.
@@ -94,7 +100,7 @@ def _surfaces(assembly: Assembly, *, hulls: bool) -> Surfaces:
     return Surfaces(triangles[kept], normals, body, first, points, first_vertex)
 
 
-def facet_distances(hulls: Surfaces, pairs: Pairs) -> Iterator[tuple[Numbers, Numbers, Array]]:
+def facet_distances(hulls: Surfaces, pairs: Numbers) -> Iterator[tuple[Numbers, Numbers, Array]]:
     """How far the vertices of b lie outside each facet of a, at the least, for pairs of bodies int64 (k, 2).
 
     Yields, a batch of pairs at a time, the pair, the facet and the distance (length, below 0 where b reaches inside).

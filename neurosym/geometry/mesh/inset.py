@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import nnls
 
-Array = NDArray[np.float64]
+from neurosym.geometry.mesh.triangles import area_vectors
+from neurosym.support.arrays import Array, Numbers
 
 #: Corners nearer than this share of the mesh's extent are one corner.
 WELD = 1e-9
@@ -15,7 +15,7 @@ WELD = 1e-9
 FARTHEST = 50.0
 
 
-def inset_vertices(vertices: Array, faces: NDArray[np.int64], depth: float) -> Array:
+def inset_vertices(vertices: Array, faces: Numbers, depth: float) -> Array:
     """Vertices, float64 (n, 3), moved so that every face lies `depth` (length) farther in, with the same faces.
 
     Each vertex goes the shortest way that brings it `depth` behind the planes of all faces about it; faces back to
@@ -30,7 +30,7 @@ def inset_vertices(vertices: Array, faces: NDArray[np.int64], depth: float) -> A
     _, corner_of = np.unique(np.round(vertices / (WELD * extent)), axis=0, return_inverse=True)
     corner_of = corner_of.reshape(-1)
     t = vertices[faces]
-    normals = np.cross(t[:, 1] - t[:, 0], t[:, 2] - t[:, 0])
+    normals = area_vectors(t)
     area = np.linalg.norm(normals, axis=1)
     real = area > 1e-12 * extent**2
     normals = np.repeat(normals[real] / area[real, None], 3, axis=0)

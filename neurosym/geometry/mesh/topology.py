@@ -5,19 +5,17 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-Array = NDArray[np.float64]
-Faces = NDArray[np.int64]
+from neurosym.support.arrays import Array, Numbers, Truths
 
 #: Open edges beyond this number are a hole, not a row of T-junctions: nobody is asked to match them up.
 MAX_OPEN_EDGES = 5_000
 
 
-def merged(vertices: Array, faces: Faces, within: float = 0.0) -> tuple[Array, Faces]:
+def merged(vertices: Array, faces: Numbers, within: float = 0.0) -> tuple[Array, Numbers]:
     """Vertices in one place made one, unused ones dropped; `within` a length: chains of nearer ones, too."""
     used, inverse = np.unique(faces, return_inverse=True)
     # Adding 0 turns -0 into 0.
@@ -33,7 +31,7 @@ def merged(vertices: Array, faces: Faces, within: float = 0.0) -> tuple[Array, F
     return vertices, faces
 
 
-def without_repeats(faces: Faces) -> Faces:
+def without_repeats(faces: Numbers) -> Numbers:
     """The faces that have three corners, each once; a face and its mirror image, back to back, cancel."""
     a, b, c = faces.T
     faces = faces[(a != b) & (b != c) & (c != a)]
@@ -50,7 +48,7 @@ def without_repeats(faces: Faces) -> Faces:
     return faces[kept]
 
 
-def _alike(rows: NDArray[np.float64] | NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _alike(rows: Array | Numbers) -> tuple[Numbers, Numbers]:
     """Equal rows as groups: the group of each row, and the first row of each group."""
     order = np.lexsort(rows.T[::-1])
     new = np.ones(len(order), dtype=bool)
@@ -60,12 +58,12 @@ def _alike(rows: NDArray[np.float64] | NDArray[np.int64]) -> tuple[NDArray[np.in
     return group, order[new]
 
 
-def _components(pairs: NDArray[np.int64], count: int) -> NDArray[np.int64]:
+def _components(pairs: Numbers, count: int) -> Numbers:
     graph = coo_matrix((np.ones(len(pairs), dtype=np.int8), (pairs[:, 0], pairs[:, 1])), (count, count))
     return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
 
 
-def half_edges(faces: Faces) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def half_edges(faces: Numbers) -> tuple[Numbers, Numbers]:
     """The half edges of faces (m, 3): start and end, int64 (3 m, 2), and the number of the edge of each, (3 m,).
 
     Half edge h belongs to face h % m.
@@ -75,12 +73,12 @@ def half_edges(faces: Faces) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     return half, np.unique(low * (int(faces.max()) + 1) + high, return_inverse=True)[1].astype(np.int64)
 
 
-def _upward(half: NDArray[np.int64]) -> Array:
+def _upward(half: Numbers) -> Array:
     """+1 for a half edge that runs to the higher number, -1 for one that comes back."""
     return np.where(half[:, 0] < half[:, 1], 1.0, -1.0)
 
 
-def open_edges(faces: Faces) -> tuple[NDArray[np.int64], bool]:
+def open_edges(faces: Numbers) -> tuple[Numbers, bool]:
     """Half edges (k, 2) that no face comes back along; and whether turning faces might close them all."""
     half, edge = half_edges(faces)
     balance = np.bincount(edge, weights=_upward(half))
@@ -89,7 +87,7 @@ def open_edges(faces: Faces) -> tuple[NDArray[np.int64], bool]:
     return half[odd], bool(odd.any() and (np.bincount(edge) % 2 == 0).all())
 
 
-def neighbours(faces: Faces) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+def neighbours(faces: Numbers) -> tuple[Numbers, Truths]:
     """Faces that share an edge with each other and no third, int64 (k, 2), and whether both go along it alike."""
     half, edge = half_edges(faces)
     order = np.argsort(edge, kind="stable")
@@ -97,7 +95,7 @@ def neighbours(faces: Faces) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
     return pairs % len(faces), half[pairs[:, 0], 0] == half[pairs[:, 1], 0]
 
 
-def same_winding(faces: Faces) -> Faces | None:
+def same_winding(faces: Numbers) -> Numbers | None:
     """The faces turned so that neighbours agree, or None where no way of turning does (a Moebius strip).
 
     Each face is two nodes, as it is and turned; neighbours join the nodes that agree. Where a face falls into one
@@ -115,12 +113,12 @@ def same_winding(faces: Faces) -> Faces | None:
     return np.where(turned[:, None], faces[:, ::-1], faces)
 
 
-def shells_of(faces: Faces) -> NDArray[np.int64]:
+def shells_of(faces: Numbers) -> Numbers:
     """int64 (m,): the number of the shell that each face belongs to; shells that meet in an edge are two."""
     return _components(neighbours(faces)[0], len(faces))
 
 
-def closes_at_junctions(vertices: Array, faces: Faces, within: float) -> bool:
+def closes_at_junctions(vertices: Array, faces: Numbers, within: float) -> bool:
     """Whether the open edges close once each is cut at the open corners that lie on it, nearer than `within`."""
     half, _ = open_edges(faces)
     if not 0 < len(half) <= MAX_OPEN_EDGES:
@@ -142,14 +140,25 @@ def closes_at_junctions(vertices: Array, faces: Faces, within: float) -> bool:
     return not np.bincount(edge, weights=_upward(cut)).any()
 
 
-def area_vectors(vertices: Array, faces: Faces) -> Array:
-    """float64 (m, 3): outward normals, as long as the faces are large."""
-    t = vertices[faces]
-    vectors: Array = np.cross(t[:, 1] - t[:, 0], t[:, 2] - t[:, 0]) / 2
-    return vectors
-
-
-def shell_volumes(vertices: Array, faces: Faces, shells: NDArray[np.int64]) -> Array:
+def shell_volumes(vertices: Array, faces: Numbers, shells: Numbers) -> Array:
     """Signed volume of each shell, float64 (k,), positive where its faces point outward."""
     a, b, c = (vertices[faces[:, k]] - vertices.mean(axis=0) for k in range(3))
-    return np.asarray(np.bincount(shells, weights=np.einsum("nd,nd->n", a, np.cross(b, c)) / 6), dtype=np.float64)
+    return np.asarray(np.bincount(shells, weights=_six_volumes(a, b, c) / 6), dtype=np.float64)
+
+
+def signed_volume(vertices: Array, faces: Numbers) -> float:
+    """Volume enclosed by a closed mesh, positive when its faces point outward (divergence theorem)."""
+    return float(_six_volumes(*(vertices[faces[:, k]] - vertices[0] for k in range(3))).sum() / 6)
+
+
+def volume_and_centre(vertices: Array, faces: Numbers) -> tuple[float, Array]:
+    """The same, and the centroid, float64 (3,)."""
+    a, b, c = (vertices[faces[:, k]] - vertices[0] for k in range(3))
+    six = _six_volumes(a, b, c)
+    volume = float(six.sum() / 6)
+    return volume, vertices[0] + (six[:, None] / 6 * (a + b + c)).sum(axis=0) / (4 * volume)
+
+
+def _six_volumes(a: Array, b: Array, c: Array) -> Array:
+    """float64 (m,): six times the volumes of tetrahedra with a corner at the origin and three at rows of a, b, c."""
+    return np.asarray(np.einsum("nd,nd->n", a, np.cross(b, c)))

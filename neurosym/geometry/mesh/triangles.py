@@ -3,20 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-import shapely
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 from trimesh.triangles import closest_point
 
-Array = NDArray[np.float64]
-Pairs = NDArray[np.int64]
-
-#: Rows that one array operation works on at most: what bounds memory.
-CHUNK = 1_000_000
-
-#: Up to this many pairs all are compared with all, without a tree.
-DENSE = 250_000
+from neurosym.geometry.mesh.broad_phase import CHUNK, near_pairs
+from neurosym.support.arrays import Array, Numbers, Truths
 
 #: A small fixed turn, so that rays upwards meet no edge of a mesh drawn along the axes, and bounds stay tight.
 _TILT = Rotation.from_rotvec([0.0137, -0.0219, 0.0171]).as_matrix()
@@ -27,35 +19,16 @@ def bounds(triangles: Array) -> tuple[Array, Array]:
     return triangles.min(axis=1), triangles.max(axis=1)
 
 
-def near_pairs(first: tuple[Array, Array], second: tuple[Array, Array], limit: int) -> Pairs | None:
-    """Pairs (k, 2) of boxes, one of each set, that overlap or touch; None when there are more than `limit`.
+def area_vectors(triangles: Array) -> Array:
+    """float64 (m, 3): normals, outward, each as long as twice the area."""
+    return np.asarray(np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]))
 
-    Args:
-        first, second: lowest and highest corners, float64 (n, 3) each.
-    """
-    (low_a, high_a), (low_b, high_b) = first, second
-    if not len(low_a) or not len(low_b):
-        return np.zeros((0, 2), dtype=np.int64)
-    if len(low_a) * len(low_b) <= min(DENSE, limit):
-        meet = (low_a[:, None] <= high_b[None]).all(axis=2) & (low_b[None] <= high_a[:, None]).all(axis=2)
-        return np.argwhere(meet)
-    # A tree over the two axes along which boxes are smallest for their spread; the third axis is looked at after.
-    spread = np.ptp(low_b, axis=0) / np.maximum((high_b - low_b).mean(axis=0), 1e-300)
-    x, y = np.argsort(-spread)[:2]
-    z = 3 - x - y
-    tree = shapely.STRtree(shapely.box(low_b[:, x], low_b[:, y], high_b[:, x], high_b[:, y]))
-    asked = shapely.box(low_a[:, x], low_a[:, y], high_a[:, x], high_a[:, y])
-    found, count = [], 0
-    step = max(16, 5 * CHUNK // len(low_b))
-    for start in range(0, len(asked), step):
-        i, j = tree.query(asked[start : start + step])
-        i = i + start
-        meet = (low_a[i, z] <= high_b[j, z]) & (low_b[j, z] <= high_a[i, z])
-        found.append(np.stack([i[meet], j[meet]], axis=1))
-        count += int(meet.sum())
-        if count > limit:
-            return None
-    return np.concatenate(found).astype(np.int64)
+
+def plane_axes(normals: Array) -> tuple[Array, Array]:
+    """Two unit vectors, float64 (..., 3) each, that span the plane across each unit normal (..., 3)."""
+    u = np.cross(normals, np.eye(3)[np.abs(normals).argmin(axis=-1)])
+    u /= np.linalg.norm(u, axis=-1, keepdims=True)
+    return u, np.cross(normals, u)
 
 
 def are_convex(vertices: Array, triangles: Array, margin: float) -> bool:
@@ -75,11 +48,11 @@ def are_convex(vertices: Array, triangles: Array, margin: float) -> bool:
 
 
 def _unit_normals(triangles: Array) -> Array:
-    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    normals = area_vectors(triangles)
     return np.asarray(normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300))
 
 
-def crossing_pairs(triangles: Array, margin: float, limit: int) -> Pairs | None:
+def crossing_pairs(triangles: Array, margin: float, limit: int) -> Numbers | None:
     """Pairs (k, 2), i < j, of triangles (m, 3, 3) of which an edge goes through the other, `margin` on either side.
 
     None when more than `limit` pairs would have to be looked at. Triangles that only touch, or lie in one plane, do
@@ -111,7 +84,7 @@ def crossing_pairs(triangles: Array, margin: float, limit: int) -> Pairs | None:
 
 def pierced(
     segments: Array, triangles: Array, normals: Array, margin: float
-) -> tuple[NDArray[np.bool_], Array]:
+) -> tuple[Truths, Array]:
     """Whether segment i, (k, 2, 3), goes through triangle i, (k, 3, 3), bool (k,), and where, float64 (k, 3).
 
     It goes through when it ends more than `margin` away on either side. The triangle's edges belong to it: a segment
@@ -129,7 +102,7 @@ def pierced(
     return np.asarray(crosses), point
 
 
-def are_inside(points: Array, triangles: Array) -> NDArray[np.bool_]:
+def are_inside(points: Array, triangles: Array) -> Truths:
     """bool (n,): which points a closed surface (m, 3, 3) goes round, by counting its faces above each point."""
     if not len(points) or not len(triangles):
         return np.zeros(len(points), dtype=bool)

@@ -11,18 +11,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import product
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.contact import collision
 from neurosym.geometry.mesh.inset import inset_vertices
 from neurosym.geometry.rigid_motions import Interpolation
 from neurosym.geometry.shapes import Body, Box, Mesh
-
-if TYPE_CHECKING:
-    from neurosym.geometry.assembly import Assembly
 
 Array = NDArray[np.float64]
 
@@ -215,7 +212,7 @@ class Floor:
     """A plane below which no moving body may go."""
 
     def __init__(self, assembly: Assembly, moving: Sequence[int], ground: float) -> None:
-        self._vertices = np.concatenate([assembly.body_vertices(i) for i in moving])
+        self._vertices = np.concatenate([assembly.bodies.vertices(i) for i in moving])
         self._level = ground - assembly.touch
         self._step = LEAST_STEP * assembly.touch
 

@@ -10,20 +10,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from neurosym.errors import InputError
+from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.paths.lattice import Lattice
 from neurosym.geometry.paths.path_check import check_path
 from neurosym.geometry.paths.removal import OutOfBudget, Removal
 from neurosym.geometry.rigid_motions import Interpolation, shifted
 from neurosym.geometry.step_motion import Kind, StepMotion
-
-if TYPE_CHECKING:
-    from neurosym.geometry.assembly import Assembly
 
 Array = NDArray[np.float64]
 
@@ -76,7 +74,7 @@ def extract(
     """A path that takes parts, moving as one, out from among others.
 
     They are out when a plane across one of the axes divides them from the others. Straight lines are not asked first:
-    `Assembly.blocking` knows them.
+    `BlockingGraph` knows them.
 
     Args:
         moving: a bitset of the parts that leave together.

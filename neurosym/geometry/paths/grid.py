@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import product
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.shapes import Box
-
-if TYPE_CHECKING:
-    from neurosym.geometry.assembly import Assembly
 
 Array = NDArray[np.float64]
 
@@ -60,7 +57,7 @@ def cells_of(assembly: Assembly) -> GridCells | None:
     the touching tolerance, at whole multiples of one length an axis, with no cell in two parts. The lengths need not
     be equal: bricks have a grid, too.
     """
-    if not assembly.all_boxes:
+    if not assembly.bodies.all_boxes:
         return None
     frame = assembly.X_WB[0][:3, :3]
     turns = np.einsum("ji,njk->nik", frame, assembly.X_WB[:, :3, :3])

@@ -46,7 +46,7 @@ class Lattice:
         self._digits = int(np.ceil(2 - np.log10(removal.assembly.touch)))
         ground = removal.ground is None or bool(np.isclose(np.abs(self._frame[2]).max(), 1.0, atol=1e-9))
         self.complete = removal.aligned and ground and not turns
-        self._own = np.concatenate([removal.assembly.body_vertices(i) for i in removal.own_bodies]) - removal.centre
+        self._own = np.concatenate([removal.assembly.bodies.vertices(i) for i in removal.own_bodies]) - removal.centre
         self._rotations = [np.eye(3)]
         self._pivots = np.zeros((0, 3))
         if turns:

@@ -34,8 +34,8 @@ def levels_along(removal: Removal, direction: Array, rotation: Array, digits: in
     # Offsets are the centre's: turning back the direction is cheaper than turning the parts.
     towards = rotation.T @ direction
     base = float(removal.centre @ (direction - towards))
-    own = [assembly.body_vertices(i) @ towards + base for i in removal.own_bodies]
-    others = [assembly.body_vertices(i) @ direction for i in removal.other_bodies]
+    own = [assembly.bodies.vertices(i) @ towards + base for i in removal.own_bodies]
+    others = [assembly.bodies.vertices(i) @ direction for i in removal.other_bodies]
     low, high = min(o.min() for o in own), max(o.max() for o in own)
     ends = min(o.min() for o in others), max(o.max() for o in others)
     room = 0.25 * assembly.smallest_extent

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.paths.clearance import Clearance, Floor
 from neurosym.geometry.step_motion import StepMotion
-
-if TYPE_CHECKING:
-    from neurosym.geometry.assembly import Assembly
 
 Array = NDArray[np.float64]
 
@@ -34,24 +31,12 @@ class PathCheck:
     reason: str = ""
 
 
-def centre_of(assembly: Assembly, mask: int) -> Array:
-    """The middle, float64 (3,), of the bounds of the parts in a bitset, in the world."""
-    own = assembly.body_bounds[[mask >> int(o) & 1 == 1 for o in assembly.owners]]
-    middle: Array = (own[:, 0].min(axis=0) + own[:, 1].max(axis=0)) / 2
-    return middle
-
-
 def apart(assembly: Assembly, a: Array, b: Array) -> bool:
     """Whether points (n, 3) and others (m, 3) leave a gap, wider than touch, along an axis of the world or assembly."""
     axes = np.concatenate([np.eye(3), assembly.axes]).T
     one, two = a @ axes, b @ axes
     gap = np.maximum(one.min(axis=0) - two.max(axis=0), two.min(axis=0) - one.max(axis=0))
     return bool(gap.max() > assembly.touch)
-
-
-def bodies_of(assembly: Assembly, mask: int) -> list[int]:
-    """Numbers of the bodies of the parts in a bitset."""
-    return [i for i, owner in enumerate(assembly.owners) if mask >> int(owner) & 1]
 
 
 def check_path(motion: StepMotion, assembly: Assembly, among: int, *, ground: float | None = None) -> PathCheck:
@@ -70,8 +55,8 @@ def check_path(motion: StepMotion, assembly: Assembly, among: int, *, ground: fl
     """
     tracks = motion.tracks
     masks = [sum(1 << assembly.index[assembly[name].name] for name in t.parts) for t in tracks]
-    bodies = [bodies_of(assembly, mask) for mask in masks]
-    resting = bodies_of(assembly, among & ~sum(masks))
+    bodies = [assembly.bodies.of(mask) for mask in masks]
+    resting = assembly.bodies.of(among & ~sum(masks))
     pairs: list[tuple[int, int | None, Clearance]] = []
     for a, own in enumerate(bodies):
         if resting:
@@ -99,10 +84,10 @@ def _away(motion: StepMotion, assembly: Assembly, among: int) -> PathCheck:
     pose = {name: t.poses[-1] for t in motion.tracks for name in t.parts}
     leaving: list[Array] = []
     others: list[Array] = []
-    for i in bodies_of(assembly, among):
+    for i in assembly.bodies.of(among):
         name = assembly.names[assembly.owners[i]]
         X = pose.get(name, np.eye(4))
-        points = assembly.body_vertices(i) @ X[:3, :3].T + X[:3, 3]
+        points = assembly.bodies.vertices(i) @ X[:3, :3].T + X[:3, 3]
         (leaving if name in motion.parts else others).append(points)
     if not others or apart(assembly, np.concatenate(leaving), np.concatenate(others)):
         return PathCheck(True)

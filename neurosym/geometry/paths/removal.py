@@ -4,20 +4,17 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
+from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.paths.clearance import Clearance, Floor
-from neurosym.geometry.paths.path_check import apart, bodies_of, centre_of
+from neurosym.geometry.paths.path_check import apart
 from neurosym.geometry.rigid_motions import Interpolation, shifted
 from neurosym.geometry.shapes import Box
 from neurosym.geometry.step_motion import Kind, StepMotion, Track
-
-if TYPE_CHECKING:
-    from neurosym.geometry.assembly import Assembly
 
 Array = NDArray[np.float64]
 
@@ -51,12 +48,12 @@ class Removal:
         seconds: float | None,
     ) -> None:
         self.assembly, self.moving, self.others, self.ground = assembly, moving, others & ~moving, ground
-        self.own_bodies, self.other_bodies = bodies_of(assembly, moving), bodies_of(assembly, self.others)
+        self.own_bodies, self.other_bodies = assembly.bodies.of(moving), assembly.bodies.of(self.others)
         self.clearance = Clearance(assembly, self.own_bodies, self.other_bodies)
         self.floor = None if ground is None else Floor(assembly, self.own_bodies, ground)
-        self.centre = centre_of(assembly, moving)
-        self.own_points = _extreme(np.concatenate([assembly.body_vertices(i) for i in self.own_bodies]))
-        self.other_points = _extreme(np.concatenate([assembly.body_vertices(i) for i in self.other_bodies]))
+        self.centre = assembly.bodies.centre(moving)
+        self.own_points = _extreme(np.concatenate([assembly.bodies.vertices(i) for i in self.own_bodies]))
+        self.other_points = _extreme(np.concatenate([assembly.bodies.vertices(i) for i in self.other_bodies]))
         self.frame, self.aligned = self._frame()
         self._axes = np.concatenate([np.eye(3), assembly.axes, self.frame.T])
         spans = self.other_points @ self._axes.T
@@ -145,7 +142,7 @@ class Removal:
             return frame, bool(np.abs(turns - np.round(turns)).max() <= assembly.tolerances.parallel)
         area = []
         for i in self.own_bodies:
-            t = assembly.body_vertices(i)[assembly.bodies[i].shape.faces]
+            t = assembly.bodies.vertices(i)[assembly.bodies[i].shape.faces]
             area.append(np.cross(t[:, 1] - t[:, 0], t[:, 2] - t[:, 0]))
         first = _main_direction(np.concatenate(area))
         across = np.concatenate(area)

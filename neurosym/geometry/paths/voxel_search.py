@@ -1,4 +1,10 @@
-"""The breadth-first search over the states of a block of voxel parts.
+"""Taking voxel puzzles apart by translating groups of parts: exact, complete, and with the least number of moves.
+
+A state is the offset of each part of a block, in whole cells. A move translates a group of parts together, by one or
+more cells along one axis, with the other parts at rest; a group pushed over several cells in one direction is one
+move, as in BurrTools. The breadth-first search over moves ends where a group can leave the others without end, so the
+level (moves to the first separation, the leaving move included) is the true minimum. Which groups can move is in
+`voxel_groups`, how far in `voxel_gaps`. Rotations are not searched.
 
 Why nothing is lost by whole cells. Take any motion of the parts by translations, fractional, slanting, all parts at
 once. Add a constant phase in [0, 1) to each axis and round all offsets down: two cells that are at least 1 apart along
@@ -24,11 +30,41 @@ from neurosym.support.bitsets import bits
 FEW = 24
 
 
-class Search:
-    """One breadth-first search; parts are renumbered from 0, the reference (a part, or all fixed ones) is number 0.
+def first_separation(
+    cells: GridCells,
+    among: int,
+    *,
+    fixed: int = 0,
+    ground: float | None = None,
+    start: dict[int, Offset] | None = None,
+    accept: Callable[[int], bool] | None = None,
+    max_states: int = 200_000,
+    seconds: float | None = None,
+) -> Separation | Stuck:
+    """The first separation of a block of parts, with as few moves as can be.
 
-    Arguments as for `voxel_moves.first_separation`.
+    Of the groups that can leave after the same number of moves, the smallest leaves; of two halves, the smaller.
+
+    Args:
+        among: a bitset: the parts of the block, two or more.
+        fixed: a bitset of parts that never move. They count as one, and never leave.
+        ground: height (z, world) of a plane that no part goes through. Parts that nothing fixes can be lifted all
+            together, so it matters only where there are fixed parts.
+        start: offsets of parts that are not in their assembled places.
+        accept: which groups are wanted; a group that leaves is the smallest that holds one of its parts. Other
+            groups may make way, but stay by the block: states in which a plane with room about it divides the parts
+            are left aside. That can be many states: give `max_states`.
+        max_states: how many states may be visited.
+        seconds: how long it may take; None: however long. Where this ends a search, another run may go farther.
+
+    Raises:
+        InputError: fewer than two parts to tell apart, or parts too far from one another.
     """
+    return _Search(cells, among, fixed & among, ground, start or {}, accept).run(max_states, seconds)
+
+
+class _Search:
+    """One search; parts are renumbered from 0, the reference (a part, or all fixed ones) is number 0."""
 
     def __init__(
         self,

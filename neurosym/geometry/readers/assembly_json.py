@@ -20,24 +20,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from neurosym.errors import AssemblyError
 from neurosym.geometry.assembly import Assembly
-from neurosym.geometry.readers.contents import (
-    MAX_TEXT_BYTES,
-    Contents,
-    RawMesh,
-    gunzip,
-    inside,
-    read_bytes,
-    within_limits,
-)
+from neurosym.geometry.readers.contents import Contents, RawMesh
+from neurosym.geometry.readers.limits import MAX_TEXT_BYTES, gunzip, inside, read_bytes, within_limits
+from neurosym.geometry.rigid_motions import are_rigid
 from neurosym.geometry.shapes import Body, Box, Convex, Mesh, Part, Shape, boxes_part
 from neurosym.geometry.tolerances import DEFAULT_TOLERANCES, Tolerances
+from neurosym.support.arrays import Array
 from neurosym.support.files import write_text
-
-Array = NDArray[np.float64]
 
 FORMAT = "neurosym-assembly"
 
@@ -264,7 +256,6 @@ def _size(at: str, value: Any) -> Array:
 
 def _pose(at: str, value: Any) -> Array:
     X = _array(at, value, (4, 4))
-    R = X[:3, :3]
-    if not np.allclose(R @ R.T, np.eye(3), atol=1e-6) or np.linalg.det(R) < 0 or not np.array_equal(X[3], [0, 0, 0, 1]):
+    if not are_rigid(X):
         raise _Odd(f"{at} is no rigid motion: a rotation and a shift, last row 0 0 0 1")
     return X

@@ -11,13 +11,14 @@ from typing import Any
 
 import numpy as np
 from defusedxml.ElementTree import fromstring
-from numpy.typing import NDArray
 
 from neurosym.errors import AssemblyError, InputError
-from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.notes import Note
-from neurosym.geometry.readers.contents import MAX_TEXT_BYTES, Contents, gunzip, read_bytes, reading, within_limits
+from neurosym.geometry.readers.cells import parts_from_cells
+from neurosym.geometry.readers.contents import Contents
+from neurosym.geometry.readers.limits import MAX_TEXT_BYTES, gunzip, read_bytes, reading, within_limits
 from neurosym.geometry.readers.names import distinct
+from neurosym.support.arrays import Numbers
 
 #: Cells of one shape's bounding box, and of all pieces together: each becomes a body.
 MAX_CELLS = 100_000
@@ -30,7 +31,7 @@ _ORIENTATIONS = (
 )  # fmt: skip
 
 
-def rotations() -> NDArray[np.int64]:
+def rotations() -> Numbers:
     """int64 (24, 3, 3): the rotation matrices by number."""
     found = np.zeros((24, 3, 3), dtype=np.int64)
     for number, word in enumerate(_ORIENTATIONS):
@@ -44,7 +45,7 @@ class _Shape:
     """``name``; ``cells``: int64 (n, 3), from the hotspot."""
 
     name: str
-    cells: NDArray[np.int64]
+    cells: Numbers
     variable: int
 
 
@@ -114,7 +115,7 @@ def _shape(voxel: Any, number: int, path: Path) -> _Shape:
 def _placed(pieces: list[tuple[str, _Shape]], words: list[str], path: Path) -> Contents:
     R = rotations()
     names, notes = distinct([name for name, _ in pieces])
-    cells: dict[str, NDArray[np.int64]] = {}
+    cells: dict[str, Numbers] = {}
     at = 0
     for name, (_, shape) in zip(names, pieces):
         if at < len(words) and words[at] == "x":
@@ -132,5 +133,5 @@ def _placed(pieces: list[tuple[str, _Shape]], words: list[str], path: Path) -> C
         raise AssemblyError(f"Expected placements of {len(pieces)} pieces in {path}; got {len(words)} numbers.")
     if sum(map(len, cells.values())) > MAX_CELLS:
         raise AssemblyError(f"Expected at most {MAX_CELLS:,} cells in {path}; got more.")
-    parts = Assembly.from_cells({name: own.tolist() for name, own in cells.items()}).parts
+    parts = parts_from_cells({name: own.tolist() for name, own in cells.items()}, 1.0)
     return Contents(parts, notes=tuple(notes))

@@ -8,9 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from neurosym.geometry.notes import Note
-from neurosym.geometry.readers.contents import Y_UP, Array, Contents, RawMesh
+from neurosym.geometry.readers.contents import Y_UP, Contents, RawMesh
 from neurosym.geometry.shapes import Body, Box, Part, Shape
 from neurosym.geometry.units import factor, unit
+from neurosym.support.arrays import Array
 
 
 def upright(contents: Contents) -> Contents:

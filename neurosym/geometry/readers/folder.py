@@ -14,16 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from neurosym.errors import AssemblyError, UnknownNameError
-from neurosym.geometry.readers.contents import (
-    MAX_TEXT_BYTES,
-    Contents,
-    RawMesh,
-    inside,
-    read_bytes,
-    reading,
-    united,
-    within_limits,
-)
+from neurosym.geometry.readers.contents import Contents, RawMesh, united
+from neurosym.geometry.readers.limits import MAX_TEXT_BYTES, inside, read_bytes, reading, within_limits
 from neurosym.geometry.readers.names import distinct
 from neurosym.geometry.readers.obj import read_obj
 from neurosym.geometry.readers.off import read_off

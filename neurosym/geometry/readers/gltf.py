@@ -21,24 +21,11 @@ from numpy.typing import NDArray
 
 from neurosym.errors import AssemblyError
 from neurosym.geometry.notes import Note
-from neurosym.geometry.readers.contents import (
-    FLOAT32,
-    MAX_BYTES,
-    MAX_FACES,
-    MAX_TEXT_BYTES,
-    Y_UP,
-    Contents,
-    RawMesh,
-    inside,
-    read_bytes,
-    reading,
-    too_large,
-    united,
-    within_limits,
-)
+from neurosym.geometry.readers import limits
+from neurosym.geometry.readers.contents import FLOAT32, Y_UP, Contents, RawMesh, united
+from neurosym.support.arrays import Array, Numbers
 
-Array = NDArray[np.float64]
-Piece = tuple[Array, NDArray[np.int64]]
+Piece = tuple[Array, Numbers]
 
 _COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
@@ -57,15 +44,15 @@ def read_gltf(path: Path, *, up: str | None = None) -> Contents:
     Raises:
         AssemblyError: it is no glTF 2.0, is compressed (Draco, meshopt), refers to files elsewhere, or is too large.
     """
-    return parse_gltf(read_bytes(path), path, up=up)
+    return parse_gltf(limits.read_bytes(path), path, up=up)
 
 
 def parse_gltf(data: bytes, path: Path, *, up: str | None = None) -> Contents:
     """The same from the bytes of a file; `path` says where its buffers lie, and names it."""
-    with reading("glTF 2.0", path):
+    with limits.reading("glTF 2.0", path):
         text, binary = _chunks(data, path) if data.startswith(b"glTF") else (data, None)
-        if len(text) > MAX_TEXT_BYTES:
-            raise too_large(path, MAX_TEXT_BYTES)
+        if len(text) > limits.MAX_TEXT_BYTES:
+            raise limits.too_large(path, limits.MAX_TEXT_BYTES)
         scene = _Scene(json.loads(text.decode("utf-8")), binary, path)
         up = up or ("z" if "trimesh" in scene.generator else "y")
         root = Y_UP if up == "y" else np.eye(4)
@@ -133,7 +120,7 @@ class _Scene:
                 continue
             mesh = united(str(node.get("name") or self.tree["meshes"][node["mesh"]].get("name") or ""), pieces, FLOAT32)
             total += len(mesh.faces)
-            within_limits(self.path, len(mesh.faces), total, len(found) + 1)
+            limits.within_limits(self.path, len(mesh.faces), total, len(found) + 1)
             # A mirrored copy has its faces inside out.
             faces = mesh.faces if np.linalg.det(X[:3, :3]) > 0 else mesh.faces[:, ::-1]
             found.append(RawMesh(mesh.name, mesh.vertices @ X[:3, :3].T + X[:3, 3], faces, FLOAT32))
@@ -184,8 +171,9 @@ class _Scene:
         accessor = self.tree["accessors"][number]
         kind, width = np.dtype(_COMPONENTS[accessor["componentType"]]), _WIDTHS[accessor["type"]]
         count = accessor["count"]
-        if not isinstance(count, int) or not 0 <= count <= 3 * MAX_FACES:
-            raise AssemblyError(f"Expected at most {3 * MAX_FACES:,} elements an array in {self.path}; got {count!r}.")
+        most = 3 * limits.MAX_FACES
+        if not isinstance(count, int) or not 0 <= count <= most:
+            raise AssemblyError(f"Expected at most {most:,} elements an array in {self.path}; got {count!r}.")
         if "bufferView" in accessor:
             values = self._view(accessor["bufferView"], accessor.get("byteOffset", 0), kind, width, count)
         else:
@@ -220,8 +208,8 @@ class _Scene:
     def _buffer(self, number: int) -> bytes:
         if number not in self._buffers:
             self._buffers[number] = self._fetch(self.tree["buffers"][number].get("uri"))
-            if sum(map(len, self._buffers.values())) > MAX_BYTES:
-                raise too_large(self.path, MAX_BYTES)
+            if sum(map(len, self._buffers.values())) > limits.MAX_BYTES:
+                raise limits.too_large(self.path, limits.MAX_BYTES)
         return self._buffers[number]
 
     def _fetch(self, uri: str | None) -> bytes:
@@ -231,7 +219,7 @@ class _Scene:
             return self.binary
         if uri.startswith("data:"):
             return base64.b64decode(uri.partition(",")[2], validate=True)
-        return read_bytes(inside(self.path.parent, unquote(uri)))
+        return limits.read_bytes(limits.inside(self.path.parent, unquote(uri)))
 
 
 def _motion(node: Mapping[str, Any]) -> Array:

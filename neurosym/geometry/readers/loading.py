@@ -1,8 +1,7 @@
 """From a folder or a file to an assembly that has been looked over.
 
-Each format's reader, under `neurosym.geometry.readers`, gives what stands in the file. Here units are settled
-(`conversion`), meshes are examined (`health`), parts are looked at where they lie (`at_rest`), and all that is wrong is
-raised together.
+Each format's reader gives what stands in the file. Here units are settled (`conversion`), meshes are examined
+(`mesh_checks`), parts are looked at where they lie (`mating`), and all that is wrong is raised together.
 """
 
 from __future__ import annotations
@@ -14,36 +13,35 @@ from pathlib import Path
 import numpy as np
 
 from neurosym.errors import AssemblyError, InputError
-from neurosym.geometry.assembly import Assembly
+from neurosym.geometry.assembly import FRICTION, Assembly, check_fixed
+from neurosym.geometry.bodies import Bodies
 from neurosym.geometry.mesh import triangles
 from neurosym.geometry.notes import FaultyPartsError, Note
 from neurosym.geometry.readers.assembly_json import read_json
-from neurosym.geometry.readers.at_rest import floating, tolerances_at_rest
 from neurosym.geometry.readers.burrtools import read_xmpuzzle
 from neurosym.geometry.readers.contents import Contents, RawMesh
 from neurosym.geometry.readers.conversion import in_units, upright
 from neurosym.geometry.readers.folder import MESHES, read_folder, read_mesh
 from neurosym.geometry.readers.gltf import read_gltf
-from neurosym.geometry.readers.health import examine
+from neurosym.geometry.readers.mating import floating, mating_tolerances
+from neurosym.geometry.readers.mesh_checks import examine
 from neurosym.geometry.readers.meshes import parts_from_meshes
 from neurosym.geometry.readers.names import distinct
 from neurosym.geometry.readers.obj import read_obj
 from neurosym.geometry.readers.step import read_step
 from neurosym.geometry.readers.threemf import read_3mf
-from neurosym.geometry.shapes import Body, Box, Convex, Part
+from neurosym.geometry.shapes import Box, Convex, Part
 from neurosym.geometry.tolerances import DEFAULT_TOLERANCES, Tolerances
 from neurosym.geometry.units import unit
-
-_FRICTION = 0.5
 
 
 @dataclass(frozen=True, kw_only=True)
 class Options:
-    """How to read what a file leaves open; see `Assembly.load`."""
+    """How to read what a file leaves open: see `load`."""
 
-    up: str | None = None
-    problem: int = 1
-    solution: int = 1
+    up: str | None
+    problem: int
+    solution: int
 
 
 #: Formats that have a word on what is up themselves; their reader heeds `up`.
@@ -69,40 +67,56 @@ def load(
     fixed: Iterable[str] = (),
     tolerances: Tolerances | None = None,
     friction: float | None = None,
-    options: Options | None = None,
+    up: str | None = None,
+    problem: int = 1,
+    solution: int = 1,
 ) -> Assembly:
-    """What `Assembly.load` does, and says."""
-    source, options = Path(path), options or Options()
+    """An assembly from a folder of meshes or from a file, looked over.
+
+    Args:
+        path: a folder with one mesh a part (OBJ, STL, PLY, OFF; see `neurosym.geometry.readers.folder`), or a file:
+            GLB, glTF, 3MF, STEP (extra ``cad``), BurrTools ``.xmpuzzle``, the JSON that `Assembly.save` writes (see
+            `neurosym.geometry.readers.assembly_json`), or one mesh. Parts are named after files or nodes.
+        units: the unit of the assembly's lengths ("mm", "m", "in", ...). Of a format that states its own (glTF and
+            STEP metres, 3MF and JSON what they say) lengths are converted to it; of others it says what they are.
+        fixed: names of parts that never move, besides those that the files name.
+        tolerances: kept as they are where given. Otherwise touch is raised, to at most 5% of the smallest extent,
+            so that mating faces that overlap a little at rest count as touching; `notes` says by how much.
+        friction: Coulomb's coefficient; None: the file's, else 0.5.
+        up: "y" or "z", what is up in the files; None: z, but in glTF see `neurosym.geometry.readers.gltf`.
+        problem, solution: which of a puzzle file's, counted from 1.
+
+    Returns:
+        The assembly; `notes` says what was seen and mended.
+
+    Raises:
+        FaultyPartsError: parts that cannot be used (open, crossing themselves, not numbers, overlapping deeply);
+            all of them, each with the measure and what to do.
+        AssemblyError: the file cannot be read, goes beyond a limit, or reaches outside its folder.
+        InputError: an unknown unit, part or number of a problem.
+        MissingDependencyError: STEP without cascadio.
+    """
+    source, options = Path(path), Options(up=up, problem=problem, solution=solution)
     if options.up not in (None, "y", "z"):
         raise InputError(f'Expected up as "y", "z" or None; got {options.up!r}.')
     contents = _read(source, options)
     contents, notes = in_units(contents, None if units is None else unit(units), source)
     names, renamed = distinct([part.name for part in contents.parts])
-    parts, found, faults = _examined([replace(p, name=n) for p, n in zip(contents.parts, names)])
-    notes += [*contents.notes, *renamed, *found]
-    stated = tolerances or contents.tolerances
-    assembly = Assembly(
-        parts if parts else (_PLACEHOLDER,),
-        contents.table,
-        friction if friction is not None else _FRICTION if contents.friction is None else contents.friction,
-        stated or DEFAULT_TOLERANCES,
-        units=contents.units,
-    )
-    if parts:
-        wanted = dict.fromkeys((*contents.fixed, *fixed))
-        lost = {fault.part for fault in faults}
-        assembly = assembly.with_fixed(name for name in wanted if name not in lost)
-        tolerances, mating, deep = tolerances_at_rest(assembly, stated is not None)
-        assembly = replace(assembly, tolerances=tolerances, _cache={})
-        faults += deep
-        notes += mating
-    if faults:
+    parts, mended, faults = _examined([replace(p, name=n) for p, n in zip(contents.parts, names)])
+    if not parts:
         raise FaultyPartsError(str(source), faults)
-    return replace(assembly, notes=(*notes, *floating(assembly)), _cache={})
-
-
-#: Stands in where no part is sound, and all that is left to do is to say so.
-_PLACEHOLDER = Part("", (Body(Box(np.ones(3)), np.eye(4)),), np.eye(4))
+    lost = {fault.part for fault in faults}
+    held = tuple(name for name in dict.fromkeys((*contents.fixed, *fixed)) if name not in lost)
+    check_fixed(held, [part.name for part in parts])
+    bodies, mask = Bodies(parts), sum(1 << i for i, part in enumerate(parts) if part.name in held)
+    mated, mating, deep = mating_tolerances(bodies, mask, tolerances or contents.tolerances)
+    if faults or deep:
+        raise FaultyPartsError(str(source), [*faults, *deep])
+    ground = float(bodies.bounds[:, 0, 2].min()) if contents.table is None else contents.table
+    loose = floating(bodies, mask, ground, mated.touch * bodies.smallest_extent)
+    notes += [*contents.notes, *renamed, *mended, *mating, *loose]
+    coefficient = next(value for value in (friction, contents.friction, FRICTION) if value is not None)
+    return Assembly(parts, contents.table, coefficient, mated, held, contents.units, tuple(notes))
 
 
 def _read(source: Path, options: Options) -> Contents:

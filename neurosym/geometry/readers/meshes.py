@@ -6,15 +6,15 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from neurosym.errors import AssemblyError
-from neurosym.geometry.assembly import Body, Box, Convex, Mesh, Part
-from neurosym.geometry.mesh.triangles import are_convex
+from neurosym.geometry.mesh.topology import signed_volume
+from neurosym.geometry.mesh.triangles import are_convex, area_vectors
+from neurosym.geometry.shapes import Body, Box, Convex, Mesh, Part
 from neurosym.geometry.tolerances import Tolerances
+from neurosym.support.arrays import Array, Numbers, Truths
 
-Array = NDArray[np.float64]
-Triangles = tuple[Array, NDArray[np.int64]]
+Triangles = tuple[Array, Numbers]
 
 #: A grid finer than this many cells a part is kept as a mesh: boxes would be slower than triangles.
 MAX_CELLS = 4_000
@@ -55,10 +55,9 @@ def _triangles(name: str, mesh: Any) -> Triangles:
         raise AssemblyError(f"Part {name!r}: expected finite coordinates; got NaN or infinity.")
     volume = signed_volume(v, f)
     extent = float(np.ptp(v, axis=0).max())
-    edges = v[f[:, [1, 2, 0]]] - v[f]
     # On a closed surface the area vectors of the faces cancel.
-    area_vectors = np.cross(edges[:, 0], -edges[:, 2]) / 2
-    if np.linalg.norm(area_vectors.sum(axis=0)) > 1e-6 * np.linalg.norm(area_vectors, axis=1).sum():
+    areas = area_vectors(v[f])
+    if np.linalg.norm(areas.sum(axis=0)) > 1e-6 * np.linalg.norm(areas, axis=1).sum():
         raise AssemblyError(
             f"Part {name!r}: expected a closed mesh; its faces leave a gap. Fill it (trimesh.repair.fill_holes)."
         )
@@ -67,13 +66,7 @@ def _triangles(name: str, mesh: Any) -> Triangles:
     return v, f if volume > 0 else f[:, ::-1]
 
 
-def signed_volume(vertices: Array, faces: NDArray[np.int64]) -> float:
-    """Volume enclosed by a closed mesh, positive when its faces point outward (divergence theorem)."""
-    a, b, c = (vertices[faces[:, k]] - vertices[0] for k in range(3))
-    return float(np.einsum("nd,nd->n", a, np.cross(b, c)).sum() / 6)
-
-
-def _one_body(vertices: Array, faces: NDArray[np.int64]) -> Body:
+def _one_body(vertices: Array, faces: Numbers) -> Body:
     """A single body, its frame at the centre of its bounds, so that numbers stay small."""
     centre = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
     X = np.eye(4)
@@ -132,7 +125,7 @@ def _common_grid(meshes: Mapping[str, Triangles], tolerances: Tolerances) -> dic
 def _mean_frame(frame: Array, meshes: list[Triangles]) -> Array:
     """The rotation (3, 3) nearest to all faces of all meshes, each weighed by its area."""
     triangles = np.concatenate([v[f] for v, f in meshes])
-    area = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    area = area_vectors(triangles)
     along = area @ frame
     axis = np.abs(along).argmax(axis=1)
     columns = [(np.sign(along[axis == k, k])[:, None] * area[axis == k]).sum(axis=0) for k in range(3)]
@@ -141,10 +134,9 @@ def _mean_frame(frame: Array, meshes: list[Triangles]) -> Array:
     return nearest
 
 
-def _orthogonal_frame(vertices: Array, faces: NDArray[np.int64], tolerances: Tolerances) -> Array | None:
+def _orthogonal_frame(vertices: Array, faces: Numbers, tolerances: Tolerances) -> Array | None:
     """Rotation (3, 3) whose columns are the directions of all faces, or None when they are not three such."""
-    t = vertices[faces]
-    normals = np.cross(t[:, 1] - t[:, 0], t[:, 2] - t[:, 0])
+    normals = area_vectors(vertices[faces])
     lengths = np.linalg.norm(normals, axis=1)
     normals = normals[lengths > 1e-9 * lengths.max()]
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
@@ -177,7 +169,7 @@ def _common_divisor(gaps: Array) -> float | None:
     return None
 
 
-def _cells(local: Array, faces: NDArray[np.int64], pitch: float) -> NDArray[np.int64] | None:
+def _cells(local: Array, faces: Numbers, pitch: float) -> Numbers | None:
     """The cells, int64 (n, 3) from 0, that a mesh in the grid's frame is the union of; None when it is not."""
     low = local.min(axis=0)
     counts = np.round(np.ptp(local, axis=0) / pitch).astype(int)
@@ -202,7 +194,7 @@ def _cells(local: Array, faces: NDArray[np.int64], pitch: float) -> NDArray[np.i
     return np.concatenate([columns[c], z[:, None]], axis=1)
 
 
-def _in_triangles(points: Array, triangles: Array) -> NDArray[np.bool_]:
+def _in_triangles(points: Array, triangles: Array) -> Truths:
     """bool (n, m): which points (n, 2) lie in which triangles (m, 3, 2)."""
     sides = []
     for k in range(3):

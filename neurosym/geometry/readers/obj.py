@@ -5,11 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from neurosym.errors import AssemblyError
-from neurosym.geometry.mesh.polygons import triangulate
-from neurosym.geometry.readers.contents import Contents, RawMesh, read_bytes, within_limits
+from neurosym.geometry.mesh.triangulation import triangulate
+from neurosym.geometry.readers.contents import Contents, RawMesh
+from neurosym.geometry.readers.limits import read_bytes, within_limits
+from neurosym.support.arrays import Numbers
 
 
 def read_obj(path: Path, *, split: bool = False) -> Contents:
@@ -19,7 +20,7 @@ def read_obj(path: Path, *, split: bool = False) -> Contents:
         AssemblyError: a line that cannot be read, with its number.
     """
     vertices: list[tuple[float, ...]] = []
-    objects: list[tuple[str, list[NDArray[np.int64]]]] = [(path.stem, [])]
+    objects: list[tuple[str, list[Numbers]]] = [(path.stem, [])]
     text = read_bytes(path).decode("utf-8", errors="replace").replace("\\\n", " ").replace("\\\r\n", " ")
     count = 0
     for number, line in enumerate(text.splitlines(), 1):

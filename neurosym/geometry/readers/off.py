@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from neurosym.errors import AssemblyError
-from neurosym.geometry.mesh.polygons import triangulate
-from neurosym.geometry.readers.contents import MAX_TEXT_BYTES, Contents, RawMesh, read_bytes, reading, within_limits
+from neurosym.geometry.mesh.triangulation import triangulate
+from neurosym.geometry.readers.contents import Contents, RawMesh
+from neurosym.geometry.readers.limits import MAX_TEXT_BYTES, read_bytes, reading, within_limits
 
 #: What the first word may be: plain, with colours, with normals, with texture coordinates.
 _KINDS = {"OFF", "COFF", "NOFF", "STOFF", "CNOFF"}

@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from neurosym.errors import AssemblyError
-from neurosym.geometry.mesh.polygons import triangulate
-from neurosym.geometry.readers.contents import FLOAT32, FLOAT64, Contents, RawMesh, read_bytes, reading, within_limits
+from neurosym.geometry.mesh.triangulation import triangulate
+from neurosym.geometry.readers.contents import FLOAT32, FLOAT64, Contents, RawMesh
+from neurosym.geometry.readers.limits import read_bytes, reading, within_limits
 
 _TYPES = {
     "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4", "float": "f4",

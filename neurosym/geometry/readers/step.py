@@ -12,8 +12,9 @@ import tempfile
 from pathlib import Path
 
 from neurosym.errors import AssemblyError, MissingDependencyError
-from neurosym.geometry.readers.contents import Contents, read_bytes
+from neurosym.geometry.readers.contents import Contents
 from neurosym.geometry.readers.gltf import parse_gltf
+from neurosym.geometry.readers.limits import read_bytes
 
 #: Longest time that reading may take (s).
 MAX_SECONDS = 600.0

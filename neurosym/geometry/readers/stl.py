@@ -8,7 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from neurosym.errors import AssemblyError
-from neurosym.geometry.readers.contents import FLOAT32, Contents, RawMesh, read_bytes, reading, within_limits
+from neurosym.geometry.readers.contents import FLOAT32, Contents, RawMesh
+from neurosym.geometry.readers.limits import read_bytes, reading, within_limits
+from neurosym.support.arrays import Array
 
 _HEADER = 80
 _TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
@@ -43,7 +45,7 @@ def _binary(data: bytes) -> NDArray[np.float32] | None:
     return corners
 
 
-def _text(data: bytes, path: Path) -> NDArray[np.float64]:
+def _text(data: bytes, path: Path) -> Array:
     words = data.decode("utf-8", errors="replace").split()
     if not words or words[0].lower() != "solid" or "endsolid" not in (w.lower() for w in words[-20:]):
         said = f"{len(data):,} bytes fit no count of triangles, and no text from `solid` to `endsolid`"

@@ -13,20 +13,11 @@ from pathlib import Path
 
 import numpy as np
 from defusedxml.ElementTree import iterparse
-from numpy.typing import NDArray
 
 from neurosym.errors import AssemblyError
-from neurosym.geometry.readers.contents import (
-    MAX_TEXT_BYTES,
-    Contents,
-    RawMesh,
-    read_bytes,
-    reading,
-    too_large,
-    within_limits,
-)
-
-Array = NDArray[np.float64]
+from neurosym.geometry.readers.contents import Contents, RawMesh
+from neurosym.geometry.readers.limits import MAX_TEXT_BYTES, limited, read_bytes, reading, within_limits
+from neurosym.support.arrays import Array
 
 #: Objects within objects may be this deep.
 MAX_DEPTH = 32
@@ -96,10 +87,7 @@ def _root(archive: zipfile.ZipFile, path: Path) -> str:
 
 def _unpack(archive: zipfile.ZipFile, name: str, path: Path) -> bytes:
     with archive.open(name) as file:
-        data = file.read(MAX_TEXT_BYTES + 1)
-    if len(data) > MAX_TEXT_BYTES:
-        raise too_large(path, MAX_TEXT_BYTES)
-    return data
+        return limited(file, path, MAX_TEXT_BYTES)
 
 
 def _model(archive: zipfile.ZipFile, name: str, known: dict[str, _Model], path: Path) -> _Model:

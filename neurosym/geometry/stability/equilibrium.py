@@ -14,21 +14,15 @@ Each part's equations are divided by its own weight and moments by its own size,
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import bsr_array, csr_array
 from scipy.sparse.linalg import splu
 
+from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.contact.contacts import TABLE, Contact
 from neurosym.geometry.stability.patches import patch_axes
-
-if TYPE_CHECKING:
-    from neurosym.geometry.assembly import Assembly
-
-Array = NDArray[np.float64]
-Numbers = NDArray[np.int64]
+from neurosym.support.arrays import Array, Numbers, Truths
 
 #: Edges of the pyramid that stands for a friction cone. Its section has the area of the cone's: friction is exact to
 #: 2% in every direction, and does not prefer the axes of the world.
@@ -246,7 +240,7 @@ class _Newton:
             share = guess
         return share
 
-    def _solve(self, active: NDArray[np.bool_], weight: float, right: Array) -> Array:
+    def _solve(self, active: Truths, weight: float, right: Array) -> Array:
         """The Newton system: wrenches of the active edges times their transpose."""
         outer = np.einsum("ie,je->eij", self.edges, self.edges).reshape(CONE_EDGES, 9)
         inner = (active.astype(np.float64) @ outer).reshape(-1, 3, 3)

@@ -13,12 +13,9 @@ import random
 import time
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
+from neurosym.geometry.stability.standing import Stability
 from neurosym.support.bitsets import bits
-
-if TYPE_CHECKING:
-    from neurosym.geometry.assembly import Assembly
 
 #: So many random removals in a row that met nothing new end the search for what falls.
 QUIET = 40
@@ -60,7 +57,7 @@ class Falls:
 
 
 def find_falls(
-    assembly: Assembly,
+    stability: Stability,
     initial: int,
     moves: Mapping[int, Sequence[int]],
     *,
@@ -78,6 +75,7 @@ def find_falls(
     single parts, which are few questions, and random removals.
 
     Args:
+        stability: of the assembly.
         initial: bitset of the parts that are there at first.
         moves: number of a part -> for each way out a bitset of parts that must be gone before. Others never leave.
         held: how many parts may be held; with any, sets do not stand by themselves, and whole states are looked at.
@@ -85,7 +83,7 @@ def find_falls(
         seconds: when to stop.
     """
     start = time.monotonic()
-    search = _Search(assembly, initial, held, moves)
+    search = _Search(stability, initial, held, moves)
     if search.exhaust(None if seconds is None else start + seconds / 2):
         return Falls(search.least(), True, search.sets)
     for order in refuted:
@@ -106,11 +104,10 @@ def find_falls(
 class _Search:
     """The falls found so far, and the questions that find more."""
 
-    def __init__(self, assembly: Assembly, initial: int, held: int, moves: Mapping[int, Sequence[int]]) -> None:
-        self.moves = moves
-        self.stability = assembly.stability()
+    def __init__(self, stability: Stability, initial: int, held: int, moves: Mapping[int, Sequence[int]]) -> None:
+        self.moves, self.stability = moves, stability
         self.initial, self.held = initial, held
-        self.fixed = assembly.fixed_mask & initial
+        self.fixed = stability.assembly.fixed_mask & initial
         self.loose = initial & ~self.fixed
         self.falls: list[Fall] = []
         self.stood: set[int] = set()

@@ -1,14 +1,27 @@
-"""Which parts to hold so that a subset stands: a search for a set that hits every motion in which it falls."""
+"""Whether a subset stands, and which parts to hold so that it does: a set that hits every motion in which it falls."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
 
 from neurosym.support.bitsets import bits
 
-if TYPE_CHECKING:
-    from neurosym.geometry.stability.standing import Standing
+
+@dataclass(frozen=True)
+class Standing:
+    """Whether a subset of parts stands.
+
+    Attributes:
+        stands: the answer.
+        moving: if not, a bitset of parts that move in a virtual motion that nothing resists. While all of them are
+            there, none of them held, any smaller subset falls too.
+        held: a bitset of the parts that have to be held for it to stand.
+    """
+
+    stands: bool
+    moving: int = 0
+    held: int = 0
 
 
 def parts_to_hold(standing: Callable[[int], Standing], hands: int, most: int) -> tuple[int | None, list[int]]:

@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import linprog
 from scipy.sparse import csc_array, hstack
 
 from neurosym.errors import NeurosymError
 from neurosym.geometry.contact.contacts import TABLE
 from neurosym.geometry.stability.equilibrium import BALANCE, CONE_EDGES, Balance, Equilibrium
-
-Numbers = NDArray[np.int64]
+from neurosym.support.arrays import Numbers
 
 
 def solve_program(whole: Equilibrium, parts: Numbers, corners: Numbers, names: Sequence[str]) -> Balance:

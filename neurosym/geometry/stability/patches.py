@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
-from numpy.typing import NDArray
 
-from neurosym.geometry.assembly import Box
+from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.contact.contacts import TABLE, Contact, hull_points
-from neurosym.geometry.readers.meshes import signed_volume
-
-if TYPE_CHECKING:
-    from neurosym.geometry.assembly import Assembly
-
-Array = NDArray[np.float64]
+from neurosym.geometry.mesh.topology import volume_and_centre
+from neurosym.geometry.shapes import Box
+from neurosym.support.arrays import Array
 
 
 def patch_axes(patch: Contact) -> tuple[Array, Array]:
@@ -63,11 +57,7 @@ def masses(assembly: Assembly) -> tuple[Array, Array]:
         if isinstance(body.shape, Box):
             volume, centre = float(np.prod(body.shape.size)), assembly.X_WB[i][:3, 3]
         else:
-            vertices, faces = assembly.body_vertices(i), body.shape.faces
-            volume = signed_volume(vertices, faces)
-            a, b, c = (vertices[faces[:, k]] - vertices[0] for k in range(3))
-            each = np.einsum("nd,nd->n", a, np.cross(b, c)) / 6
-            centre = vertices[0] + (each[:, None] * (a + b + c)).sum(axis=0) / (4 * volume)
+            volume, centre = volume_and_centre(assembly.bodies.vertices(i), body.shape.faces)
         volumes[owner] += volume
         moments[owner] += volume * centre
     densities = np.array([p.density for p in assembly.parts])

@@ -16,23 +16,17 @@ from __future__ import annotations
 import functools
 from collections import OrderedDict, deque
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from neurosym.geometry.contact.contacts import TABLE
+from neurosym.geometry.assembly import Assembly
+from neurosym.geometry.contact.contacts import TABLE, Contact
 from neurosym.geometry.stability.equilibrium import BALANCE, CONE_EDGES, QUICK, THOROUGH, Balance, Equilibrium
-from neurosym.geometry.stability.holding import parts_to_hold
+from neurosym.geometry.stability.holding import Standing, parts_to_hold
 from neurosym.geometry.stability.linear_program import solve_program
 from neurosym.geometry.stability.patches import masses, merged_patches
+from neurosym.support.arrays import Array, Numbers, Truths
 from neurosym.support.bitsets import bits
-
-if TYPE_CHECKING:
-    from neurosym.geometry.assembly import Assembly
-
-Array = NDArray[np.float64]
-Numbers = NDArray[np.int64]
 
 #: Up to so many movable parts a question is answered from scratch: the evidence is the same whatever was asked before.
 SMALL = 48
@@ -44,35 +38,23 @@ _KEPT_FORCES, _KEPT_FALLS = 12, 400
 _MOVING = (0.3, 3e-2, 1e-3, 1e-6)
 
 
-@dataclass(frozen=True)
-class Standing:
-    """Whether a subset of parts stands.
-
-    Attributes:
-        stands: the answer.
-        moving: if not, a bitset of parts that move in a virtual motion that nothing resists. While all of them are
-            there, none of them held, any smaller subset falls too.
-        held: a bitset of the parts that have to be held for it to stand.
-    """
-
-    stands: bool
-    moving: int = 0
-    held: int = 0
-
-
 @dataclass(frozen=True, eq=False)
 class _Question:
     """Parts that are there, those among them that can move, and the corners between them, as masks and numbers."""
 
     subset: int
     movable: int
-    present: NDArray[np.bool_]
+    present: Truths
     parts: Numbers
     corners: Numbers
 
 
 class Stability:
     """Answers `standing(subset)` for an assembly; each subset is solved once and remembered.
+
+    Args:
+        contacts: of the assembly.
+        remember: whether answers are kept; otherwise each question is solved anew.
 
     Attributes:
         masses: float64 (n_parts,): density times volume.
@@ -82,11 +64,11 @@ class Stability:
         asked: how the questions so far were answered: {"kept", "near", "whole", "program"} -> how many.
     """
 
-    def __init__(self, assembly: Assembly) -> None:
-        self.assembly = assembly
+    def __init__(self, assembly: Assembly, contacts: tuple[Contact, ...], *, remember: bool = True) -> None:
+        self.assembly, self.remember = assembly, remember
         n = len(assembly)
         self.masses, self._centres = masses(assembly)
-        patches = merged_patches(assembly, assembly.contacts())
+        patches = merged_patches(assembly, contacts)
         self.touching, self.supports, self.on_table = [0] * n, [0] * n, 0
         for p in patches:
             if p.b == TABLE:
@@ -111,7 +93,7 @@ class Stability:
         answer = self._answers.get((subset, held))
         if answer is None:
             answer = self._answer(subset, held)
-            if self.assembly.keeps_answers:
+            if self.remember:
                 self._answers[subset, held] = answer
         return answer
 
@@ -285,7 +267,7 @@ class Stability:
         return Standing(True, 0, held)
 
     def _fell(self, subset: int, moving: int, held: int) -> Standing:
-        if self.assembly.keeps_answers:
+        if self.remember:
             self._falls.append((subset, moving))
         return Standing(False, moving, held)
 

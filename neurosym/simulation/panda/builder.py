@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from neurosym.errors import InputError
-from neurosym.geometry.assembly import Assembly, Box
+from neurosym.geometry.assembly import Assembly
+from neurosym.geometry.shapes import Box
 from neurosym.planning.staging import Staging
 from neurosym.simulation.panda.arm import WIDEST, from_above
 from neurosym.simulation.panda.cell import Cell, Load

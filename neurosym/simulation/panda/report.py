@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from neurosym.errors import InputError
-from neurosym.geometry.assembly import Assembly, boxes_part
+from neurosym.geometry.assembly import Assembly
+from neurosym.geometry.shapes import boxes_part
 
 Array = NDArray[np.float64]
 

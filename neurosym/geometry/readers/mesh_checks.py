@@ -9,15 +9,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from neurosym.geometry.mesh import topology, triangles
 from neurosym.geometry.notes import Note
-from neurosym.geometry.readers.contents import MAX_FACES, RawMesh
+from neurosym.geometry.readers.contents import RawMesh
+from neurosym.geometry.readers.limits import MAX_FACES
 from neurosym.geometry.tolerances import DEFAULT_TOLERANCES
-
-Array = NDArray[np.float64]
-Faces = NDArray[np.int64]
+from neurosym.support.arrays import Array, Numbers
 
 #: Extents of a part lie between these, in the file's unit: beyond, squares and cubes of lengths lose all digits.
 SMALLEST, LARGEST = 1e-9, 1e9
@@ -56,7 +54,7 @@ class Examined:
     """
 
     vertices: Array
-    faces: Faces
+    faces: Numbers
     notes: tuple[Note, ...]
     faults: tuple[Note, ...]
 
@@ -93,7 +91,7 @@ def examine(mesh: RawMesh) -> Examined:
     return Examined(vertices, faces, tuple(found.notes), tuple(found.faults))
 
 
-def _can_be_measured(vertices: Array, faces: Faces, rounding: float, found: _Findings) -> bool:
+def _can_be_measured(vertices: Array, faces: Numbers, rounding: float, found: _Findings) -> bool:
     if not len(vertices) or not len(faces):
         found.fault("empty", 0, "is empty: it has no faces", "Take the file away, or export the part again.")
         return False
@@ -126,7 +124,7 @@ def _can_be_measured(vertices: Array, faces: Faces, rounding: float, found: _Fin
     return True
 
 
-def _closed(vertices: Array, faces: Faces, found: _Findings) -> tuple[Array, Faces]:
+def _closed(vertices: Array, faces: Numbers, found: _Findings) -> tuple[Array, Numbers]:
     """The mesh with its vertices merged, its faces of no area dropped, wound one way; faults where it is open."""
     given = len(faces)
     extent = float(np.ptp(vertices[np.unique(faces)], axis=0).max())
@@ -165,11 +163,11 @@ def _closed(vertices: Array, faces: Faces, found: _Findings) -> tuple[Array, Fac
     return vertices, faces
 
 
-def _outward(vertices: Array, faces: Faces, found: _Findings) -> Faces:
+def _outward(vertices: Array, faces: Numbers, found: _Findings) -> Numbers:
     """The faces turned so that each shell is a solid, or a cavity in one."""
     shells = topology.shells_of(faces)
     volumes = topology.shell_volumes(vertices, faces, shells)
-    area = float(np.linalg.norm(topology.area_vectors(vertices, faces), axis=1).sum())
+    area = float(np.linalg.norm(triangles.area_vectors(vertices[faces]) / 2, axis=1).sum())
     extent = float(np.ptp(vertices, axis=0).max())
     total = float(volumes.sum())
     if 2 * np.abs(volumes).sum() <= FLAT * extent * area or abs(total) <= FLAT * extent * area / 2:
@@ -192,7 +190,7 @@ def _outward(vertices: Array, faces: Faces, found: _Findings) -> Faces:
     return faces
 
 
-def _look_for_crossings(vertices: Array, faces: Faces, found: _Findings) -> None:
+def _look_for_crossings(vertices: Array, faces: Numbers, found: _Findings) -> None:
     margin = CROSSING * float(np.ptp(vertices, axis=0).min())
     folds = _folds(vertices, faces, margin)
     if folds:
@@ -225,7 +223,7 @@ def _look_for_crossings(vertices: Array, faces: Faces, found: _Findings) -> None
         found.note("self-intersecting", count, said, UNITE)
 
 
-def _look_for_nested(vertices: Array, faces: Faces, shells: NDArray[np.int64], found: _Findings) -> None:
+def _look_for_nested(vertices: Array, faces: Numbers, shells: Numbers, found: _Findings) -> None:
     volumes = topology.shell_volumes(vertices, faces, shells)
     if not 1 < len(volumes) <= MAX_SHELLS:
         return
@@ -235,12 +233,12 @@ def _look_for_nested(vertices: Array, faces: Faces, shells: NDArray[np.int64], f
             found.note("self-intersecting", volumes[k], said, UNITE)
 
 
-def _folds(vertices: Array, faces: Faces, margin: float) -> int:
+def _folds(vertices: Array, faces: Numbers, margin: float) -> int:
     """How many pairs of neighbouring faces lie on one another: what is left of a hollow polygon cut as a fan."""
     pairs, _ = topology.neighbours(faces)
-    vectors = topology.area_vectors(vertices, faces)
-    area = np.linalg.norm(vectors, axis=1)
     t = vertices[faces]
+    vectors = triangles.area_vectors(t) / 2
+    area = np.linalg.norm(vectors, axis=1)
     longest = np.linalg.norm(t - np.roll(t, 1, axis=1), axis=2).max(axis=1)
     wide = 2 * area > 10 * margin * np.maximum(longest, 1e-300)
     pairs = pairs[wide[pairs].all(axis=1)]

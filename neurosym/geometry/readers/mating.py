@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from neurosym.geometry.assembly import Assembly
-from neurosym.geometry.contact import collision
+from neurosym.geometry.bodies import Bodies
+from neurosym.geometry.contact.collision import Gaps
 from neurosym.geometry.contact.overlaps import overlaps
-from neurosym.geometry.mesh import triangles
+from neurosym.geometry.mesh.broad_phase import overlapping_pairs
 from neurosym.geometry.notes import Note
-from neurosym.geometry.tolerances import Tolerances
+from neurosym.geometry.tolerances import DEFAULT_TOLERANCES, Tolerances
 
 #: Mating faces may overlap by this share of the smallest extent: measured on timber joints, answers held so far.
 MAX_MATING = 5e-2
@@ -20,18 +20,21 @@ MAX_MATING = 5e-2
 _ABOVE = 1.2
 
 
-def tolerances_at_rest(assembly: Assembly, stated: bool) -> tuple[Tolerances, list[Note], list[Note]]:
+def mating_tolerances(
+    bodies: Bodies, fixed: int, stated: Tolerances | None
+) -> tuple[Tolerances, list[Note], list[Note]]:
     """Tolerances that take the overlap of mating faces for touch, a note on it, and the overlaps that are too deep.
 
     Args:
-        stated: whether the tolerances were given; then they are kept, and say how deep an overlap may be.
+        fixed: a bitset of parts that may overlap one another.
+        stated: tolerances that were given: they are kept, and say how deep an overlap may be.
     """
-    tolerances, smallest = assembly.tolerances, assembly.smallest_extent
+    tolerances, smallest = stated or DEFAULT_TOLERANCES, bodies.smallest_extent
     limit = tolerances.touch if stated else max(MAX_MATING, tolerances.touch)
     deepest: dict[tuple[str, str], float] = {}
-    for overlap in overlaps(assembly):
-        pair = (assembly.names[assembly.owners[overlap.a]], assembly.names[assembly.owners[overlap.b]])
-        deepest[pair] = max(deepest.get(pair, 0.0), overlap.depth)
+    for overlap in overlaps(bodies, fixed):
+        a, b = (bodies.parts[bodies.owners[i]].name for i in (overlap.a, overlap.b))
+        deepest[a, b] = max(deepest.get((a, b), 0.0), overlap.depth)
     faults = [
         Note(
             a,
@@ -58,38 +61,34 @@ def tolerances_at_rest(assembly: Assembly, stated: bool) -> tuple[Tolerances, li
     return replace(tolerances, touch=touch), [Note(a, "mating", depth, said, other=b)], faults
 
 
-def floating(assembly: Assembly) -> list[Note]:
-    """A note for each part that touches neither another one nor the ground, and is not fixed."""
-    touch, bounds, owners = assembly.touch, assembly.body_bounds, assembly.owners
-    held = np.array([bool(assembly.fixed_mask >> i & 1) for i in range(len(assembly))])
-    held[owners[bounds[:, 0, 2] <= assembly.ground + touch]] = True
-    grown = (bounds[:, 0] - touch / 2, bounds[:, 1] + touch / 2)
-    pairs = triangles.near_pairs(grown, grown, 50 * triangles.CHUNK)
-    pairs = np.zeros((0, 2), dtype=np.int64) if pairs is None else pairs
-    pairs = pairs[(pairs[:, 0] < pairs[:, 1]) & (owners[pairs[:, 0]] != owners[pairs[:, 1]])]
-    objects: dict[int, object] = {}
+def floating(bodies: Bodies, fixed: int, ground: float, touch: float) -> list[Note]:
+    """A note for each part that touches neither another one nor the ground, and is not fixed.
 
-    def gap(a: int, b: int) -> float:
-        for i in (a, b):
-            if i not in objects:
-                objects[i] = collision.shape_object(assembly.bodies[i].shape, assembly.X_WB[i])
-        return max(collision.distance(objects[a], objects[b]), 0.0)
-
-    for a, b in pairs:
-        if not held[owners[[a, b]]].all() and gap(int(a), int(b)) <= touch:
+    Args:
+        fixed: a bitset of parts.
+        ground: height (z, world).
+        touch: how far apart two parts may be (length) that touch.
+    """
+    bounds, owners = bodies.bounds, bodies.owners
+    held = np.array([bool(fixed >> i & 1) for i in range(len(bodies.parts))])
+    held[owners[bounds[:, 0, 2] <= ground + touch]] = True
+    gaps = Gaps(bodies)
+    for a, b in overlapping_pairs(bounds[:, 0] - touch / 2, bounds[:, 1] + touch / 2, owners):
+        if not held[owners[[a, b]]].all() and gaps.between(int(a), int(b)) <= touch:
             held[owners[[a, b]]] = True
     notes = []
     for part in np.flatnonzero(~held):
-        name = assembly.names[part]
+        name = bodies.parts[part].name
         own, others = np.flatnonzero(owners == part), np.flatnonzero(owners != part)
         away = np.maximum(bounds[own[0], 0] - bounds[others, 1], bounds[others, 0] - bounds[own[0], 1]).max(axis=1)
         near = others[np.argsort(away)[:8]]
         least, nearest = min(
-            [(gap(int(i), int(j)), assembly.names[owners[j]]) for i in own[:64] for j in near], default=(np.inf, "")
+            ((gaps.between(int(i), int(j)), bodies.parts[owners[j]].name) for i in own[:64] for j in near),
+            default=(np.inf, ""),
         )
-        above = float(bounds[own, 0, 2].min() - assembly.ground)
-        said = f"Part {name!r} touches nothing: it is {above:.4g} above the ground"
-        said += f", and {least:.4g} from {nearest!r}, the nearest part." if nearest else "."
+        above = float(bodies.part_bounds[part, 0, 2] - ground)
+        sentence = f"Part {name!r} touches nothing: it is {above:.4g} above the ground"
+        sentence += f", and {least:.4g} from {nearest!r}, the nearest part." if nearest else "."
         remedy = "Move it, fix it, or state a larger Tolerances(touch=), --touch on the command line."
-        notes.append(Note(name, "floating", min(above, least), said, remedy))
+        notes.append(Note(name, "floating", min(above, least), sentence, remedy))
     return notes

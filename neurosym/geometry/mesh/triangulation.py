@@ -9,13 +9,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
+from neurosym.support.arrays import Array, Numbers, Truths
 
 
-def triangulate(vertices: Array, polygons: Sequence[Indices]) -> Indices:
+def triangulate(vertices: Array, polygons: Sequence[Numbers]) -> Numbers:
     """Triangles of polygons given as numbers of vertices.
 
     Args:
@@ -25,7 +23,7 @@ def triangulate(vertices: Array, polygons: Sequence[Indices]) -> Indices:
     Returns:
         int64 (m, 3), the sum of k - 2 triangles, wound as the polygons are.
     """
-    found: list[Indices] = []
+    found: list[Numbers] = []
     sizes = np.array([len(p) for p in polygons], dtype=np.int64)
     for size in np.unique(sizes):
         same = np.array([p for p in polygons if len(p) == size], dtype=np.int64)
@@ -40,7 +38,7 @@ def triangulate(vertices: Array, polygons: Sequence[Indices]) -> Indices:
     return np.concatenate(found) if found else np.zeros((0, 3), dtype=np.int64)
 
 
-def _turned(polygons: Indices, vertices: Array) -> Indices:
+def _turned(polygons: Numbers, vertices: Array) -> Numbers:
     """Polygons (n, k) that start, of four corners, on the shorter diagonal, else at the least corner (x, y, z).
 
     The least corner decides, too, between diagonals of one length.
@@ -59,7 +57,7 @@ def _turned(polygons: Indices, vertices: Array) -> Indices:
     return np.asarray(polygons[rows[:, None], start])
 
 
-def _are_convex(corners: Array) -> NDArray[np.bool_]:
+def _are_convex(corners: Array) -> Truths:
     """bool (n,): which of the polygons, float64 (n, k, 3), turn one way only, and once."""
     with np.errstate(all="ignore"):
         normal = _newell(corners)
@@ -80,7 +78,7 @@ def _newell(corners: Array) -> Array:
     return vectors
 
 
-def _ears(corners: Array) -> Indices:
+def _ears(corners: Array) -> Numbers:
     """Triangles, int64 (k - 2, 3), of one polygon (k, 3), by clipping the ear that leaves the widest angle."""
     normal = _newell(corners[None])[0]
     drop = int(np.argmax(np.abs(normal)))

@@ -3,18 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.contact.surfaces import Surfaces, facet_distances
-from neurosym.geometry.mesh.broad_phase import Pairs, overlapping_pairs
-
-if TYPE_CHECKING:
-    from neurosym.geometry.assembly import Assembly
-
-Array = NDArray[np.float64]
+from neurosym.geometry.mesh.broad_phase import overlapping_pairs
+from neurosym.support.arrays import Array, Numbers
 
 #: Share of the smallest extent that counts as an overlap at rest, however coarse `touch` is: along an oblique joint a
 #: layer thinner than `touch` may yet be deeper and wider than it.
@@ -22,7 +17,7 @@ OVERLAP = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class RestOverlaps:
+class MatingOverlaps:
     """Pairs of bodies whose convex hulls overlap by more than `OVERLAP` and no more than `mate`.
 
     Attributes:
@@ -31,33 +26,29 @@ class RestOverlaps:
         count: of all bodies.
     """
 
-    pairs: Pairs
+    pairs: Numbers
     shifts: Array
     count: int
 
-    @staticmethod
-    def of(assembly: Assembly) -> RestOverlaps:
-        """Found once for an assembly."""
-        return assembly.remember("rest overlaps", lambda: _overlaps(assembly))
-
-    def apart(self, pairs: Pairs) -> Array:
-        """float64 (k, 3): by how much b is thought moved off a, for pairs a < b; mostly 0."""
-        found = np.zeros((len(pairs), 3))
+    def apart(self, pairs: Numbers) -> Array:
+        """float64 (k, 3): by how much b is thought moved off a, for pairs (a, b) either way round; mostly 0."""
+        apart = np.zeros((len(pairs), 3))
         if not len(self.pairs) or not len(pairs):
-            return found
+            return apart
+        low, high = np.sort(pairs, axis=1).T
         known = self.pairs[:, 0] * self.count + self.pairs[:, 1]
-        keys = pairs[:, 0] * self.count + pairs[:, 1]
+        keys = low * self.count + high
         place = np.minimum(np.searchsorted(known, keys), len(known) - 1)
         same = known[place] == keys
-        found[same] = self.shifts[place[same]]
-        return found
+        apart[same] = self.shifts[place[same]]
+        apart[pairs[:, 0] > pairs[:, 1]] *= -1
+        return apart
 
 
-def _overlaps(assembly: Assembly) -> RestOverlaps:
+def mating_overlaps(assembly: Assembly, hulls: Surfaces) -> MatingOverlaps:
     """The facet of either hull that is overlapped least shows the shortest way apart (up to edges against edges)."""
     bounds, half = assembly.body_bounds, min(assembly.touch, OVERLAP * assembly.smallest_extent) / 2
     near = overlapping_pairs(bounds[:, 0] + half, bounds[:, 1] - half, assembly.owners)
-    hulls = Surfaces.of_hulls(assembly)
     depth = np.full(len(near), np.inf)
     ways = np.zeros((len(near), 3))
     for pairs, sign in ((near, 1.0), (near[:, ::-1], -1.0)):
@@ -68,4 +59,4 @@ def _overlaps(assembly: Assembly) -> RestOverlaps:
             depth[pair[better]] = -distance[better]
             ways[pair[better]] = sign * hulls.normals[facet[better]]
     kept = (depth > 2 * half) & (depth <= assembly.mate)
-    return RestOverlaps(near[kept], depth[kept, None] * ways[kept], len(assembly.bodies))
+    return MatingOverlaps(near[kept], depth[kept, None] * ways[kept], len(assembly.bodies))
