@@ -9,22 +9,12 @@ from typing import TYPE_CHECKING, Any
 from neurosym.errors import ContractError, DefinitionError, InputError, UnknownNameError
 from neurosym.geometry.step_motion import StepMotion
 from neurosym.language.actions import moved_parts
-from neurosym.language.problem import check_precedence
+from neurosym.language.instances import Instance, check_precedence, instantiate, reachable_instances
 from neurosym.language.search_problem import Rejection, Step, Verdict
 from neurosym.language.terms import Atom, Derived, Fluent, Literal
 
 if TYPE_CHECKING:
     from neurosym.language.problem import Problem
-
-
-class _Instance:
-    """A ground action before it has bits."""
-
-    def __init__(self, name: str, pre: Sequence[Literal], eff: Sequence[Literal]) -> None:
-        self.name = name
-        self.fluents = [p for p in pre if not isinstance(p.atom.predicate, Derived)]
-        self.derived = [p for p in pre if isinstance(p.atom.predicate, Derived)]
-        self.eff = eff
 
 
 class GroundProblem:
@@ -37,8 +27,8 @@ class GroundProblem:
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
         self.world = problem.predicate_world
-        instances, all_names = self._instances()
-        reachable = _reachable(set(problem.init), instances)
+        instances, all_names = instantiate(problem)
+        reachable = reachable_instances(set(problem.init), instances)
         self.actions: tuple[str, ...] = tuple(i.name for i in reachable)
         self._check_goal(reachable)
         check_precedence(problem.before, all_names, f"problem {problem.name!r}")
@@ -150,29 +140,7 @@ class GroundProblem:
 
     # -- construction -----------------------------------------------------------------------------------------
 
-    def _instances(self) -> tuple[list[_Instance], list[str]]:
-        problem = self.problem
-        changed = {e.atom.predicate for a in problem.domain.actions for e in a.eff}
-        initial = set(problem.init)
-        instances: list[_Instance] = []
-        seen: dict[str, str] = {}
-        for action in problem.domain.actions:
-            for binding in problem.bindings(action):
-                name = action.ground_name(binding)
-                if name in seen:
-                    raise DefinitionError(
-                        f"In problem {problem.name!r}: two ground actions are called {name!r} "
-                        f"({seen[name]} and {action.name} {binding}); give the action a label over all its parameters."
-                    )
-                seen[name] = f"{action.name} {binding}"
-                pre = [p.bind(binding) for p in action.pre]
-                static = [p for p in pre if isinstance(p.atom.predicate, Fluent) and p.atom.predicate not in changed]
-                if all((p.atom in initial) is p.positive for p in static):
-                    pre = [p for p in pre if p not in static]
-                    instances.append(_Instance(name, pre, [e.bind(binding) for e in action.eff]))
-        return instances, list(seen)
-
-    def _check_goal(self, reachable: Sequence[_Instance]) -> None:
+    def _check_goal(self, reachable: Sequence[Instance]) -> None:
         made = {e.atom for i in reachable for e in i.eff if e.positive} | set(self.problem.init)
         unmade = {e.atom for i in reachable for e in i.eff if not e.positive}
         for i, goal in enumerate(self.problem.goal):
@@ -195,7 +163,7 @@ class GroundProblem:
     def _derived_goals(self) -> list[Literal]:
         return [g for g in self.problem.goal if isinstance(g.atom.predicate, Derived)]
 
-    def _number(self, reachable: Sequence[_Instance]) -> dict[Atom, int]:
+    def _number(self, reachable: Sequence[Instance]) -> dict[Atom, int]:
         """Atom -> bit. Fluents of one argument take one run of bits in the order of the objects: `mask` shifts."""
         bits: dict[Atom, int] = {}
         self.runs: dict[Fluent, tuple[int, tuple[str, ...]]] = {}
@@ -282,28 +250,3 @@ def _as_motion(predicate: Derived, given: Any) -> StepMotion:
             f"Expected the derived predicate {predicate} to answer with a StepMotion as motion, or with a direction of "
             f"three numbers; got {given!r}."
         ) from None
-
-
-def _reachable(initial: set[Atom], instances: Sequence[_Instance]) -> list[_Instance]:
-    """Instances that some sequence of actions may reach, when nothing that was ever true or false is lost."""
-    true = set(initial)
-    untrue_possible = {e.atom for i in instances for e in i.eff if not e.positive}
-    waiting, found = list(instances), []
-    while True:
-        now = [
-            i
-            for i in waiting
-            if all(
-                p.atom in true if p.positive else p.atom not in initial or p.atom in untrue_possible
-                for p in i.fluents
-            )
-        ]
-        if not now:
-            break
-        found.extend(now)
-        taken = set(map(id, now))
-        waiting = [i for i in waiting if id(i) not in taken]
-        for i in now:
-            true.update(e.atom for e in i.eff if e.positive)
-    order = {id(i): k for k, i in enumerate(instances)}
-    return sorted(found, key=lambda i: order[id(i)])

@@ -10,7 +10,6 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 from typing import Literal as OneOf
 
-import networkx as nx
 import numpy as np
 from numpy.typing import NDArray
 
@@ -200,20 +199,3 @@ def checked_pairs(given: Any, place: str) -> tuple[tuple[str, str], ...]:
             raise DefinitionError(f"{advice}; got {pair!r} in it.")
         pairs.append((pair[0], pair[1]))
     return tuple(pairs)
-
-
-def check_precedence(before: Sequence[tuple[str, str]], names: Iterable[str], place: str) -> None:
-    """Refuse precedence over unknown actions, and precedence in a circle (which is named)."""
-    known = set(names)
-    graph = nx.DiGraph()
-    for i, (a, b) in enumerate(before):
-        for action in (a, b):
-            if action not in known:
-                raise DefinitionError(f"In {place}, before[{i}]: {UnknownNameError('action', action, known)}")
-        graph.add_edge(a, b)
-    try:
-        cycle = nx.find_cycle(graph)
-    except nx.NetworkXNoCycle:
-        return
-    circle = " before ".join([a for a, _ in cycle] + [cycle[0][0]])
-    raise DefinitionError(f"In {place}: precedence in a circle, so no order can obey it: {circle}.")
