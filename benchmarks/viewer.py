@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from neurosym.geometry.assembly import Assembly
+from neurosym.geometry.staging import staged
 from neurosym.geometry.step_motion import StepMotion
-from neurosym.planning.staging import staged
 from neurosym.viewer.scene import PlanScene
 from neurosym.viewer.server import LocalServer
 from neurosym.viewer.timeline import Timeline

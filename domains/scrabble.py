@@ -20,11 +20,11 @@ from domains.scrabble_demonstrations import demonstrate, picture_seed
 from domains.scrabble_rules import DOMAIN, Reference, all_slots_filled, laid, tile
 from domains.scrabble_tiles import COUNTS, LONGEST, N_TEST, N_TRAIN, SHORTEST, TILES, VALUES
 from neurosym.errors import InputError, UnknownNameError
+from neurosym.geometry.staging import Staging
 from neurosym.geometry.step_motion import StepMotion
 from neurosym.language import Atom, Problem
 from neurosym.language.demonstrations import Demonstrations
 from neurosym.language.problem_family import ProblemFamily, Progress
-from neurosym.planning.staging import Staging
 
 #: How many problems of a part are meant where nobody says how many: enough for `compare`, and for its blind baseline.
 DEFAULT_COUNTS = {"train": 50, "test": 200}

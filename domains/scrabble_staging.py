@@ -10,7 +10,7 @@ import numpy as np
 from domains.scrabble_drawing import tile_face
 from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.shapes import boxes_part
-from neurosym.planning.staging import Staging, building
+from neurosym.geometry.staging import Staging, building
 
 #: A tile: its edges, and from the middle of one slot to that of the next (edges of a tile).
 SIZE, PITCH = (1.0, 1.0, 0.22), 1.04

@@ -20,11 +20,11 @@ from domains.tower_demonstrations import demonstrate
 from domains.tower_pictures import draw_offsets, picture_seed, setting_named, take_picture, take_pictures
 from domains.tower_variants import TALLEST, VARIANTS, blocks_of, sequences, split_numbers, towers
 from neurosym.errors import AssemblyError, InputError, UnknownNameError
+from neurosym.geometry.staging import Staging, building
 from neurosym.geometry.step_motion import StepMotion
 from neurosym.language import Problem
 from neurosym.language.demonstrations import Demonstrations
 from neurosym.language.problem_family import ProblemFamily, Progress
-from neurosym.planning.staging import Staging, building
 
 
 class TowerFamily(ProblemFamily):

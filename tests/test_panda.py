@@ -14,7 +14,8 @@ from learned_priors import NetworkPrior
 from neurosym.errors import InputError
 from neurosym.geometry.paths.joint_motion import plan_joint_motion
 from neurosym.geometry.queries import AssemblyGeometry
-from neurosym.planning.staging import building, stage
+from neurosym.geometry.staging import building
+from neurosym.planning.staging import stage
 from neurosym.simulation.client import Client
 from neurosym.simulation.panda import BuildSettings, CellFilm, build_with_panda, starting_places
 from neurosym.simulation.panda.arm import HOME, PandaArm, from_above

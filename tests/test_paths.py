@@ -23,8 +23,8 @@ from neurosym.geometry.paths.voxel_search import first_separation
 from neurosym.geometry.paths.voxel_separation import Separation
 from neurosym.geometry.rigid_motions import Interpolation, shifted
 from neurosym.geometry.shapes import Body, Box, Mesh, Part
+from neurosym.geometry.staging import staged
 from neurosym.geometry.step_motion import StepMotion, Track
-from neurosym.planning.staging import staged
 from neurosym.testing.burrs import RINGS
 
 STAY = np.eye(4)

@@ -13,8 +13,9 @@ from PIL import Image
 import neurosym as ns
 from neurosym.cli import main
 from neurosym.errors import InputError, MissingDependencyError
+from neurosym.geometry.staging import Staging
 from neurosym.geometry.step_motion import StepMotion, Track
-from neurosym.planning.staging import Staging, stage
+from neurosym.planning.staging import stage
 from neurosym.simulation import film_files, open_clients
 from neurosym.simulation.animation import LONGEST, SHORTEST_STEP, frames, pace
 from neurosym.simulation.captions import captioned

@@ -24,9 +24,10 @@ import neurosym as ns
 from neurosym.cli import main
 from neurosym.errors import InputError, NeurosymError, UnknownNameError
 from neurosym.geometry.shapes import Body, Box, Mesh, Part
+from neurosym.geometry.staging import Staging, building, staged
 from neurosym.geometry.step_motion import StepMotion, Track
 from neurosym.plan_files.reading import read_plan
-from neurosym.planning.staging import Staging, building, stage, staged
+from neurosym.planning.staging import stage
 from neurosym.simulation import Physics, World, open_clients, replay_plan, replay_staging
 from neurosym.simulation.cutting import cut_into_convex
 from neurosym.simulation.decomposition import convex_pieces

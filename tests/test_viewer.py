@@ -23,9 +23,10 @@ from PIL import Image
 import neurosym as ns
 from neurosym.cli import main
 from neurosym.geometry.readers.meshes import signed_volume
+from neurosym.geometry.staging import Staging, staged
 from neurosym.geometry.step_motion import StepMotion, Track
 from neurosym.language.options import options_of
-from neurosym.planning.staging import Staging, stage, staged
+from neurosym.planning.staging import stage
 from neurosym.testing import burrs
 from neurosym.viewer import panels, score_table
 from neurosym.viewer.attempts import BECAUSE, FEW, MOST_COUNTED, MOST_REFUSALS, attempts, most_refused

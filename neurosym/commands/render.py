@@ -13,7 +13,7 @@ from neurosym.commands.common import CollapseRule, FamilyOptions, family_options
 from neurosym.errors import InputError
 
 if TYPE_CHECKING:
-    from neurosym.planning.staging import Staging
+    from neurosym.geometry.staging import Staging
 
 #: Width and height of pictures, in pixels, unless told otherwise.
 FILM_SIZE, STILL_SIZE = (640, 480), (960, 720)
@@ -115,7 +115,7 @@ def _staging(
 def _at_rest(what: str, number: int | None, files: FileOptions, options: dict[str, Any]) -> tuple[Staging, str]:
     """The assembly alone."""
     from neurosym.geometry.assembly import Assembly
-    from neurosym.planning.staging import Staging
+    from neurosym.geometry.staging import Staging
     from neurosym.registry import domain_names, load_domain
 
     if what not in domain_names() and Path(what).exists():

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
+    from neurosym.geometry.staging import Staging
     from neurosym.geometry.step_motion import StepMotion
     from neurosym.language.explanation import WhyNot
     from neurosym.language.problem import Problem
     from neurosym.language.search_problem import SearchProblem
-    from neurosym.planning.staging import Staging
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from neurosym.planning.staging import Staging
+from neurosym.geometry.staging import Staging
 from neurosym.simulation.captions import captioned
 from neurosym.simulation.film_files import RATE
 from neurosym.simulation.filming import FilmSet

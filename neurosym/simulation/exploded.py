@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from neurosym.errors import InputError
-from neurosym.planning.staging import Staging
+from neurosym.geometry.staging import Staging
 from neurosym.simulation.captions import captioned, label
 from neurosym.simulation.filming import FilmSet
 from neurosym.simulation.looks import Camera

@@ -19,8 +19,9 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from typing import TYPE_CHECKING
 
+from neurosym.geometry.staging import Staging
 from neurosym.geometry.step_motion import StepMotion
-from neurosym.planning.staging import Staging, stage
+from neurosym.planning.staging import stage
 from neurosym.simulation.carrying import Carrier, hold
 from neurosym.simulation.oracle import COLLAPSE_CUBES, CUBES_CLEARANCE
 from neurosym.simulation.physics import MOVED_SHARE, SETTLE_STEPS, Physics, Snapshot

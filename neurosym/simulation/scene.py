@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from neurosym.errors import InputError, UnknownNameError
 from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.shapes import Shape
-from neurosym.planning.staging import Staging
+from neurosym.geometry.staging import Staging
 
 Array = NDArray[np.float64]
 RGB = tuple[float, float, float]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from neurosym.planning.staging import Staging
+from neurosym.geometry.staging import Staging
 from neurosym.simulation.filming import DEFAULT_CAMERA, TOPS_CAMERA
 from neurosym.simulation.looks import Camera
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
-from neurosym.planning.staging import Staging
+from neurosym.geometry.staging import Staging
 from neurosym.simulation.scene import part_colours
 from neurosym.simulation.solids import RigidBody, Solid
 from neurosym.simulation.storyboard import best_camera, room_for

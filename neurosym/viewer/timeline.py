@@ -18,8 +18,8 @@ from neurosym.errors import InputError
 from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.queries import AssemblyGeometry
 from neurosym.geometry.rigid_motions import shifted
+from neurosym.geometry.staging import Staging
 from neurosym.geometry.step_motion import Track
-from neurosym.planning.staging import Staging
 
 Array = NDArray[np.float64]
 

@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 from neurosym.errors import InputError
 from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.shapes import Box
-from neurosym.planning.staging import Staging
+from neurosym.geometry.staging import Staging
 from neurosym.simulation.panda.arm import WIDEST, from_above
 from neurosym.simulation.panda.cell import Cell, Load
 from neurosym.simulation.panda.hand import APPROACH, CAREFUL, Failed, Hand, lifted
