@@ -22,6 +22,7 @@ from neurosym.geometry.assembly import Assembly
 from neurosym.language.demonstrations import Demonstrations
 from neurosym.language.problem_family import Progress
 from neurosym.language.search_problem import Step
+from neurosym.planning.planner import OrderCounter
 from neurosym.registry import load_planner
 from neurosym.support.disk_cache import cache_folder, load, store
 
@@ -133,17 +134,18 @@ def _count_labels(
 ) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
     """Gravity tells only which way is up, so six problems answer for 48 poses."""
     swap = [LETTERS.index({"A": "B", "B": "A"}.get(name, name)) for name in LETTERS]
-    known: dict[tuple[int, ...], tuple[NDArray[np.int64], NDArray[np.float32]]] = {}
+    known: dict[tuple[int, ...], tuple[NDArray[np.int64], NDArray[np.float64]]] = {}
     orders = np.zeros((48, 7), dtype=np.int64)
     shares = np.zeros((48, 7, 7), dtype=np.float32)
     counter = load_planner("exhaustive")
+    assert isinstance(counter, OrderCounter)
     for pose, symmetry in enumerate(symmetries()):
         up = tuple(map(int, symmetry[2]))
         mirrored = np.linalg.det(symmetry) < 0
         if up not in known:  # rotations come first, and every way up has one
             problem = family.problem_from_cells(turned(cells, symmetry), collapse="strict")
             order = np.array([LETTERS.index(name) for name in habit(problem)])
-            known[up] = order, counter.order_marginals(problem.ground())  # type: ignore[attr-defined]
+            known[up] = order, counter.order_marginals(problem.ground())
         order, share = known[up]
         orders[pose] = [swap[a] for a in order] if mirrored else order
         shares[pose] = share[:, swap] if mirrored else share

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import linear_sum_assignment
 
-from neurosym.planning.prior import OrderScores
+from neurosym.planning.order_scores import OrderScores
 
 
 def decoded(

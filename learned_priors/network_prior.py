@@ -21,7 +21,8 @@ from learned_priors.training import FitProgress, fit
 from learned_priors.weight_store import Weights, WeightStore
 from neurosym.errors import InputError
 from neurosym.language.demonstrations import Demonstrations
-from neurosym.planning.prior import OrderScores, Prior, as_picture_batch
+from neurosym.planning.order_scores import OrderScores
+from neurosym.planning.prior import Prior, as_picture_batch
 
 if TYPE_CHECKING:
     from neurosym.language.problem import Problem

@@ -49,8 +49,12 @@ _HOMES = {
         "derived",
     ),
     "neurosym.pipeline": ("count_plans", "plans", "solve"),
-    "neurosym.planning.planner": ("Budget", "Planner", "PlannerTraits", "PlanResult", "Refusal", "SearchLog", "Status"),
-    "neurosym.planning.prior": ("OrderScores", "Prior", "RandomPrior", "UniformPrior"),
+    "neurosym.planning.budget": ("Budget",),
+    "neurosym.planning.order_scores": ("OrderScores",),
+    "neurosym.planning.planner": ("Planner", "PlannerTraits"),
+    "neurosym.planning.prior": ("Prior", "RandomPrior", "UniformPrior"),
+    "neurosym.planning.result": ("PlanResult", "Status"),
+    "neurosym.planning.search_log": ("SearchLog",),
     "neurosym.language.search_problem": ("Rejection", "SearchProblem", "Step", "Verdict"),
     "neurosym.registry": (
         "domain_names",
@@ -118,17 +122,16 @@ if TYPE_CHECKING:
     from neurosym.pipeline import count_plans as count_plans
     from neurosym.pipeline import plans as plans
     from neurosym.pipeline import solve as solve
-    from neurosym.planning.planner import Budget as Budget
+    from neurosym.planning.budget import Budget as Budget
+    from neurosym.planning.order_scores import OrderScores as OrderScores
     from neurosym.planning.planner import Planner as Planner
     from neurosym.planning.planner import PlannerTraits as PlannerTraits
-    from neurosym.planning.planner import PlanResult as PlanResult
-    from neurosym.planning.planner import Refusal as Refusal
-    from neurosym.planning.planner import SearchLog as SearchLog
-    from neurosym.planning.planner import Status as Status
-    from neurosym.planning.prior import OrderScores as OrderScores
     from neurosym.planning.prior import Prior as Prior
     from neurosym.planning.prior import RandomPrior as RandomPrior
     from neurosym.planning.prior import UniformPrior as UniformPrior
+    from neurosym.planning.result import PlanResult as PlanResult
+    from neurosym.planning.result import Status as Status
+    from neurosym.planning.search_log import SearchLog as SearchLog
     from neurosym.planning.validation import Validation as Validation
     from neurosym.planning.validation import validate as validate
     from neurosym.registry import domain_names as domain_names

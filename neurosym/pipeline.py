@@ -14,8 +14,11 @@ import numpy as np
 from neurosym.errors import ContractError, InputError
 from neurosym.language.problem import Problem
 from neurosym.language.search_problem import SearchProblem
-from neurosym.planning.planner import Budget, OrderCount, Planner, PlanResult, Status
-from neurosym.planning.prior import OrderScores, Prior
+from neurosym.planning.budget import Budget
+from neurosym.planning.order_scores import OrderScores
+from neurosym.planning.planner import Planner
+from neurosym.planning.prior import Prior
+from neurosym.planning.result import OrderCount, PlanResult, Status
 from neurosym.planning.validation import replay, validate
 from neurosym.registry import load_planner, load_prior
 

@@ -1,175 +1,96 @@
-"""Backtracking: depth first, complete, in the order of the best completion under the prior.
-
-It keeps the verified prefix, learns from every refusal what need not be asked again below it (`Rejection.until`),
-and goes back only from states that are proved dead.
-"""
+"""Backtracking: depth first, complete, in the order of the best completion under the prior."""
 
 from __future__ import annotations
 
-from collections.abc import Hashable
 from dataclasses import dataclass, field
-from typing import Any, Generic, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from neurosym.language.search_problem import Rejection, SearchProblem, Step
-from neurosym.planning.planner import Budget, Planner, PlannerTraits, PlanResult, SearchLog, Status
-from neurosym.planning.prior import OrderScores
-from planners.completion import RESOLUTION, Completion, remainder, with_first
-from planners.evidence import Lessons, Names, agenda, fitted, promise, representatives
-
-S = TypeVar("S", bound=Hashable)
-
-
-@dataclass(slots=True)
-class _Frame(Generic[S]):
-    """A state on the current path: what is still untried here, and what was learned here."""
-
-    state: S
-    used: int
-    untried: list[int]
-    guess: tuple[int, ...]  # the best completion from here on; empty when it is not known
-    values: NDArray[np.float64] | None = None  # what each next action costs in the end
-    promised: list[int] = field(default_factory=list)  # actions with a promise that holds below this state
+from neurosym.language.search_problem import Rejection
+from neurosym.planning.planner import PlannerTraits
+from neurosym.planning.result import PlanResult, Status
+from planners.assignment import RESOLUTION, AssignmentHeuristic
+from planners.node import Node
+from planners.search_context import SearchContext
+from planners.search_planner import SearchPlanner
 
 
-class Backtracking(Planner):
-    """Depth-first search that learns; complete, and proves unsolvability.
+class Backtracking(SearchPlanner):
+    """Depth-first search that keeps the verified prefix, learns from every rejection, and leaves only dead states.
 
-    With scores, the next action is the first of the cheapest completion (`planners.completion`) that is not known
-    to be refused; a completion is kept for as long as it is followed, so a good prior costs one assignment.
-    Among equals, and without scores: what the last refusals named, then the rng. A node is a state with the set
-    of used actions; one found dead is never entered again.
+    With scores, the next action is the first of the cheapest completion (`planners.assignment`) that is not known to
+    be refused; a completion is kept for as long as the search keeps to it, so a good prior costs one assignment.
+    Among equals, and without scores: what rejections named last, then the rng. A state with the set of used actions
+    that was found dead is never entered again.
     """
 
     traits = PlannerTraits(complete=True)
 
-    def plan(
-        self,
-        problem: SearchProblem[S],
-        scores: OrderScores | None = None,
-        *,
-        budget: Budget | None = None,
-        rng: np.random.Generator | None = None,
-    ) -> PlanResult:
-        rng = rng or np.random.default_rng(0)
-        return _Search(problem, fitted(problem, scores), SearchLog(problem, budget), rng).run()
+    def search(self, context: SearchContext) -> PlanResult:
+        return _DepthFirst(context).run()
 
 
-class _Search(Generic[S]):
-    def __init__(
-        self, problem: SearchProblem[S], scores: OrderScores | None, log: SearchLog[S], rng: np.random.Generator
-    ) -> None:
-        self.problem, self.scores, self.log = problem, scores, log
-        completion = None if scores is None else Completion(scores, rng)
-        self.completion = None if completion is None or completion.indifferent else completion
-        self.rank = rng.permutation(len(problem.actions))  # the last tie-breaker
-        self.named = Names(problem)
-        self.agenda: list[int] = []  # named by refusals, the latest first
-        self.promises: dict[int, list[int]] = {}  # action -> masks, of all frames on the path
-        self.answers: dict[tuple[S, int], Step[S] | Rejection] = {}
-        self.lessons = Lessons()
-        self.dead: set[tuple[S, int]] = set()
-        self.path: list[_Frame[S]] = []
-        self.prefix: list[int] = []
-        self.motions: list[Any] = []
-        self.deviated = False
+@dataclass(slots=True, eq=False)
+class _Node(Node):
+    untried: list[int] = field(default_factory=list)
+    values: NDArray[np.float64] | None = None  # what each next action costs in the end
+
+
+class _DepthFirst:
+    def __init__(self, context: SearchContext) -> None:
+        self.context = context
+        heuristic = None if context.scores is None else AssignmentHeuristic(context.scores, context.rng)
+        self.heuristic = None if heuristic is None or heuristic.indifferent else heuristic
+        self.rank = context.rng.permutation(len(context.classes))  # the last tie-breaker
 
     def run(self) -> PlanResult:
-        if self.problem.is_goal(self.problem.initial):
-            return self.log.solved((), scores=self.scores, first_guess_failed=False)
-        if self.log.out_of_budget():
-            return self.log.failed(Status.OUT_OF_BUDGET)
-        self._enter(self.problem.initial, 0, ())
-        while self.path:
-            frame = self.path[-1]
-            action = self._choose(frame)
+        context, is_goal = self.context, self.context.problem.is_goal
+        root = _Node(context.problem.initial)
+        if is_goal(root.state):
+            return context.solved(root)
+        dead: set[tuple[Any, int]] = set()
+        root.untried = context.expand(root.state, root.used)
+        node: _Node | None = root
+        while node is not None:
+            action = self._next_action(node)
             if action is None:
-                self._leave()
+                dead.add((node.state, node.used))
+                context.deviated = True
+                node = node.parent
                 continue
-            answer = self.answers.get((frame.state, action))
-            if answer is None:
-                if self.log.out_of_budget():
-                    return self.log.failed(Status.OUT_OF_BUDGET, first_guess_failed=self._first_guess_failed() or None)
-                answer = self.log.attempt(tuple(self.prefix), frame.state, action)
-                self.answers[frame.state, action] = answer
-            frame.untried.remove(action)
+            answer = context.attempt(node, action)
+            node.untried.remove(action)
             if isinstance(answer, Rejection):
-                self._learn(frame, action, answer)
+                context.learn(node, action, answer)
                 continue
-            if self.problem.is_goal(answer.state):
-                failed = self._first_guess_failed()
-                plan, motions = (*self.prefix, action), (*self.motions, answer.motion)
-                return self.log.solved(plan, motions, scores=self.scores, first_guess_failed=failed)
-            used = frame.used | 1 << action
-            if (answer.state, used) in self.dead:
-                continue
-            if self.log.out_of_budget():
-                return self.log.failed(Status.OUT_OF_BUDGET, first_guess_failed=self._first_guess_failed() or None)
-            self.prefix.append(action)
-            self.motions.append(answer.motion)
-            self._enter(answer.state, used, remainder(frame.guess, action))
-        return self.log.failed(Status.UNSOLVABLE, first_guess_failed=True)
+            child = node.child(action, answer)
+            if is_goal(child.state):
+                return context.solved(child)
+            if (child.state, child.used) not in dead:
+                child.untried = context.expand(child.state, child.used)
+                node = child
+        return context.failed(Status.UNSOLVABLE)
 
-    def _enter(self, state: S, used: int, guess: tuple[int, ...]) -> None:
-        untried = representatives(self.log.candidates(state), used, self.problem.classes)
-        self.path.append(_Frame(state, used, untried, guess))
-
-    def _leave(self) -> None:
-        """Go back from a dead state; what was promised there is forgotten, for it holds only below it."""
-        frame = self.path.pop()
-        self.dead.add((frame.state, frame.used))
-        for action in frame.promised:
-            self.promises[action].pop()
-        if self.path:
-            self.prefix.pop()
-            self.motions.pop()
-            self.deviated = True
-
-    def _learn(self, frame: _Frame[S], action: int, rejection: Rejection) -> None:
-        self.lessons.learn(action, rejection)
-        mask = promise(rejection, frame.used)
-        if mask is not None:
-            self.promises.setdefault(action, []).append(mask)
-            frame.promised.append(action)
-        self.agenda = agenda(self.named(rejection), self.agenda, frame.used | 1 << action)
-
-    def _refuted(self, frame: _Frame[S], action: int) -> bool:
-        """Whether a refusal higher up on the path, or an unconditional one, promises that `action` is refused here."""
-        if self.lessons.refute(action, frame.used):
-            return True
-        return any(not mask & frame.used for mask in self.promises.get(action, ()))
-
-    def _choose(self, frame: _Frame[S]) -> int | None:
-        """The next action to ask for in this frame, or None when nothing is left."""
-        if self.completion is None:
-            options = [a for a in frame.untried if not self._refuted(frame, a)]
-            return self._foremost(options) if options else None
-        if frame.guess:
-            classes = self.problem.classes
-            action = next((a for a in frame.untried if classes[a] == classes[frame.guess[0]]), None)
-            if action is not None and not self._refuted(frame, action):
-                frame.guess = with_first(frame.guess, action)
-                return action
-        options = [a for a in frame.untried if not self._refuted(frame, a)]
+    def _next_action(self, node: _Node) -> int | None:
+        """What to attempt at this node, or None when nothing is left."""
+        options = self.context.nogoods.allowed(node, node.untried)
         if not options:
             return None
-        if frame.values is None:
-            self.deviated = self.deviated or bool(frame.guess)
-            survey = self.completion.survey(len(self.prefix), frame.used)
-            frame.values, frame.guess = survey.values, survey.best
-        least = min(frame.values[a] for a in options)
-        return self._foremost([a for a in options if frame.values[a] <= least + RESOLUTION])
+        if self.heuristic is None:
+            return self._foremost(options)
+        if node.completion and (completion := self.context.restated(node.completion, options)):
+            node.completion = completion
+            return completion[0]
+        if node.values is None:
+            self.context.deviated |= bool(node.completion)
+            assignment = self.heuristic.assign(node.depth, node.used)
+            node.values, node.completion = assignment.values, assignment.completion
+        least = min(node.values[a] for a in options)
+        return self._foremost([a for a in options if node.values[a] <= least + RESOLUTION])
 
     def _foremost(self, options: list[int]) -> int:
-        """Among equals: what the latest refusals named, then the rng's order."""
-        if self.agenda:
-            here = set(options)
-            for action in self.agenda:
-                if action in here:
-                    return action
-        return int(min(options, key=lambda a: self.rank[a]))
-
-    def _first_guess_failed(self) -> bool:
-        return self.deviated or self.log.iterations > 0
+        """Among equals: what rejections named last, then the rng's order."""
+        preferred = self.context.preferred.first_of(options)
+        return min(options, key=lambda a: int(self.rank[a])) if preferred is None else preferred

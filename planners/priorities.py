@@ -1,8 +1,4 @@
-"""Priority functions of best-first search: which waiting attempt is put to the oracle next (the least first).
-
-Each takes what is known of the order that the attempt would complete. A function of one's own is passed to
-`BestFirst(priority=...)` in the same way.
-"""
+"""Priority functions of best-first search: which waiting attempt is put to the oracle next (the least first)."""
 
 from __future__ import annotations
 
@@ -12,8 +8,8 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
-class Outlook:
-    """A waiting attempt, as if it had succeeded.
+class PartialPlan:
+    """The order so far with a waiting attempt at its end, as if that had succeeded.
 
     Attributes:
         depth: how many actions would be done then.
@@ -28,32 +24,28 @@ class Outlook:
     log_policy: float
 
 
-Priority = Callable[[Outlook], float]
+Priority = Callable[[PartialPlan], float]
 
 
-def astar(outlook: Outlook) -> float:
+def astar(partial: PartialPlan) -> float:
     """Path cost plus cost-to-go: orders come from the likeliest down. Hart, Nilsson, Raphael 1968."""
-    return outlook.path_cost + outlook.cost_to_go
+    return partial.path_cost + partial.cost_to_go
 
 
 def weighted(weight: float) -> Priority:
     """Weighted A*: a plan costs at most `weight` times the least. Pohl 1970."""
-
-    def priority(outlook: Outlook) -> float:
-        return outlook.path_cost + weight * outlook.cost_to_go
-
-    return priority
+    return lambda partial: partial.path_cost + weight * partial.cost_to_go
 
 
-def greedy(outlook: Outlook) -> float:
+def greedy(partial: PartialPlan) -> float:
     """Cost-to-go alone: nearest to the end in the prior's eyes."""
-    return outlook.cost_to_go
+    return partial.cost_to_go
 
 
-def levin(outlook: Outlook) -> float:
+def levin(partial: PartialPlan) -> float:
     """Levin tree search, log(depth / policy): a plan of depth d and probability p takes at most d / p expansions.
 
     Orseau, Lelis, Lattimore, Weber, "Single-agent policy tree search with guarantees", NeurIPS 2018, Sec. 4.1.
     It needs no assignment, only the table read as a policy.
     """
-    return math.log(outlook.depth) - outlook.log_policy
+    return math.log(partial.depth) - partial.log_policy

@@ -24,7 +24,8 @@ from learned_priors.recipes import RECIPES
 from learned_priors.temporal import TemporalDecoder, dilations
 from neurosym.errors import CheckpointError, ContractError, InputError, UnknownNameError
 from neurosym.language.demonstrations import Demonstrations
-from neurosym.planning.prior import OrderScores, Prior, RandomPrior, UniformPrior
+from neurosym.planning.order_scores import OrderScores
+from neurosym.planning.prior import Prior, RandomPrior, UniformPrior
 from neurosym.registry import load_prior
 from neurosym.testing.priors import check_prior
 

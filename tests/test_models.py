@@ -30,7 +30,7 @@ from learned_priors.stopping import log_length_of_stops
 from learned_priors.training import FitProgress
 from neurosym.errors import CheckpointError, DemonstrationError, InputError, MissingDependencyError
 from neurosym.language.demonstrations import Demonstrations
-from neurosym.planning.prior import OrderScores
+from neurosym.planning.order_scores import OrderScores
 from neurosym.registry import load_prior
 from neurosym.testing.priors import check_prior
 

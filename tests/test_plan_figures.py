@@ -182,7 +182,7 @@ def test_a_search_without_a_plan_has_no_line_of_one():
 
 
 def test_of_a_long_search_the_first_refusals_are_drawn_and_it_says_so():
-    refusals = tuple(ns.Refusal((), f"take(p{k})", "no") for k in range(MOST_REFUSALS + 50))
+    refusals = tuple(ns.Rejection("no", action=f"take(p{k})") for k in range(MOST_REFUSALS + 50))
     result = ns.PlanResult(ns.Status.GAVE_UP, None, 350, 1, 350, 0.1, blame=refusals)
     figure = search_figure(result)
     assert len(marks(figure, "x")) == MOST_REFUSALS
@@ -200,7 +200,7 @@ def names_at(figure):
 @pytest.mark.parametrize("steps", [3, 12, 30])
 def test_names_of_a_search_are_inside_and_not_on_one_another_and_it_says_how_many_are_left_out(steps):
     plan = tuple(f"take({100 + k})" for k in range(steps))
-    blame = tuple(ns.Refusal(plan[:k], f"take({200 + k})", "no") for k in range(steps))
+    blame = tuple(ns.Rejection("no", action=f"take({200 + k})", after=plan[:k]) for k in range(steps))
     figure = search_figure(ns.PlanResult(ns.Status.SOLVED, plan, steps, steps, 2 * steps, 0.1, blame=blame))
     names = names_at(figure)
     refused = {t.get_text() for t in names if same_colour(t.get_color(), REFUSED)}
@@ -227,7 +227,7 @@ def test_steps_and_kinds_that_are_there_are_named():
 
 
 def test_names_lose_what_all_of_them_share():
-    blame = (ns.Refusal(("take(a)",), "take(b)", "no"),)
+    blame = (ns.Rejection("no", action="take(b)", after=("take(a)",)),)
     result = ns.PlanResult(ns.Status.SOLVED, ("take(a)", "take(c)", "take(b)"), 1, 3, 4, 0.1, blame=blame)
     said = texts(search_figure(result))
     assert {"a", "b", "c"} <= set(said)

@@ -7,11 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from neurosym.planning.planner import Status
-from neurosym.planning.prior import OrderScores
+from neurosym.language.search_problem import Step
+from neurosym.planning.order_scores import OrderScores
+from neurosym.planning.result import Status
 from neurosym.testing.toys import Counting, NumberLine, Removal, Table, Tiles
 from planners import Backtracking, BestFirst, Exhaustive, SwapRepair, count_plans, order_marginals
-from planners.completion import Completion, remainder, with_first
+from planners.assignment import AssignmentHeuristic
+from planners.node import Node
+from planners.search_context import SearchContext
 
 COMPLETE = [Backtracking(), BestFirst(), BestFirst(priority="greedy"), BestFirst(priority="levin"), Exhaustive()]
 
@@ -119,10 +122,10 @@ def test_names_are_found_inside_the_names_of_actions() -> None:
         assert Backtracking().plan(Table(actions, leads, "end", names), rng=rng).iterations <= 2
 
 
-def test_a_followed_completion_costs_one_assignment(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_completion_that_holds_costs_one_assignment(monkeypatch: pytest.MonkeyPatch) -> None:
     calls = []
-    original = Completion.survey
-    monkeypatch.setattr(Completion, "survey", lambda self, *a: calls.append(a) or original(self, *a))
+    original = AssignmentHeuristic.assign
+    monkeypatch.setattr(AssignmentHeuristic, "assign", lambda self, *a: calls.append(a) or original(self, *a))
     for rng in rngs(10):
         word = Tiles("".join(rng.permutation(list("testset"))), ("tetsset", "testset"))
         table = np.array([[0.0 if tile == letter else -8.0 for tile in word.letters] for letter in "testset"])
@@ -135,12 +138,14 @@ def test_a_followed_completion_costs_one_assignment(monkeypatch: pytest.MonkeyPa
             assert len(calls) == 1
 
 
-def test_an_interchangeable_fellow_takes_its_place_in_the_completion() -> None:
-    assert with_first((3, 1, 2), 1) == (1, 3, 2)
-    assert with_first((3, 2), 1) == (1, 2)
-    assert remainder((1, 3, 2), 1) == (3, 2)
-    assert remainder((1, 3, 2), 3) == ()
-    assert remainder((), 3) == ()
+def test_an_interchangeable_action_takes_its_place_in_the_completion() -> None:
+    context = SearchContext(NumberLine((5, 1, 2, 1), goal=9))  # the actions 1 and 3 are interchangeable
+    assert context.restated((3, 1, 2), [1, 2]) == (1, 3, 2)
+    assert context.restated((3, 2), [0, 1]) == (1, 2)
+    assert context.restated((3, 2), [0, 2]) == ()
+    assert Node("", completion=(1, 3, 2)).child(1, Step("")).completion == (3, 2)
+    assert Node("", completion=(1, 3, 2)).child(3, Step("")).completion == ()
+    assert Node("").child(3, Step("")).completion == ()
 
 
 def test_backtracking_goes_back_from_dead_ends() -> None:

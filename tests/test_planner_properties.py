@@ -8,11 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linear_sum_assignment
 
-from neurosym.planning.planner import Status
-from neurosym.planning.prior import OrderScores
+from neurosym.planning.order_scores import OrderScores
+from neurosym.planning.result import Status
 from neurosym.testing.toys import Counting, NumberLine, Removal, Tiles, brute_force_plans
 from planners import Backtracking, BestFirst, Exhaustive, all_plans, count_plans, order_marginals
-from planners.completion import Completion
+from planners.assignment import AssignmentHeuristic
 
 removals = st.builds(
     Removal.random,
@@ -116,7 +116,7 @@ def test_promises_save_attempts_and_change_no_answer(case) -> None:
     same=st.booleans(),
 )
 @settings(max_examples=150, deadline=None)
-def test_a_survey_is_an_assignment_for_each_next_action(n: int, data, spread: float, known: bool, same: bool) -> None:
+def test_one_assignment_tells_what_each_next_action_costs(n: int, data, spread: float, known: bool, same: bool) -> None:
     steps = data.draw(st.integers(1, n))
     rng = np.random.default_rng(data.draw(st.integers(0, 2**32 - 1)))
     classes = tuple(a // 2 for a in range(n)) if same else ()
@@ -124,11 +124,11 @@ def test_a_survey_is_an_assignment_for_each_next_action(n: int, data, spread: fl
     scores = OrderScores(rng.normal(size=(steps, n)) * spread, log_length=length, classes=classes)
     step = data.draw(st.integers(0, steps - 1))
     gone = [int(a) for a in rng.permutation(n)[:step]]
-    survey = Completion(scores, rng).survey(step, sum(1 << a for a in gone))
+    assignment = AssignmentHeuristic(scores, rng).assign(step, sum(1 << a for a in gone))
 
     for action in range(n):
         if action in gone:
-            assert survey.values[action] == np.inf
+            assert assignment.values[action] == np.inf
             continue
         left = [a for a in range(n) if a not in gone and a != action]
         options = []
@@ -139,8 +139,8 @@ def test_a_survey_is_an_assignment_for_each_next_action(n: int, data, spread: fl
             options.append(scores.cost(step, action) + rest)
         expected = min(options)
         if known or expected < scores.cost(step, action) + 28:
-            assert survey.values[action] == pytest.approx(expected, abs=1e-5)
+            assert assignment.values[action] == pytest.approx(expected, abs=1e-5)
         else:  # very unlikely lengths are bounded together
-            assert survey.values[action] <= expected + 1e-5
-    if survey.best:
-        assert survey.values[survey.best[0]] == pytest.approx(survey.values.min(), abs=1e-5)
+            assert assignment.values[action] <= expected + 1e-5
+    if assignment.completion:
+        assert assignment.values[assignment.completion[0]] == pytest.approx(assignment.values.min(), abs=1e-5)

@@ -9,7 +9,10 @@ import pytest
 
 from neurosym.errors import ContractError
 from neurosym.language.search_problem import Rejection
-from neurosym.planning.planner import Budget, Planner, PlannerTraits, SearchLog, Status
+from neurosym.planning.budget import Budget
+from neurosym.planning.planner import Planner, PlannerTraits
+from neurosym.planning.result import Status
+from neurosym.planning.search_log import SearchLog
 from neurosym.testing import check_planner
 from planners import Backtracking, BestFirst, Exhaustive, SwapRepair
 

@@ -8,13 +8,14 @@ import pytest
 import neurosym.testing
 from neurosym.errors import InputError, UnknownNameError
 from neurosym.language.search_problem import Rejection, Step
-from neurosym.planning.planner import Budget, Status
-from neurosym.planning.prior import OrderScores
+from neurosym.planning.budget import Budget
+from neurosym.planning.order_scores import OrderScores
+from neurosym.planning.result import Status
 from neurosym.registry import load_planner, planner_names
 from neurosym.testing.planners import check_planner, toys
 from neurosym.testing.toys import NumberLine, Removal
 from planners import Backtracking, BestFirst, Exhaustive, SwapRepair
-from planners.priorities import Outlook
+from planners.priorities import PartialPlan
 
 
 @pytest.mark.parametrize("name", planner_names())
@@ -22,7 +23,7 @@ def test_registered_planners_pass_the_conformance_suite(name: str) -> None:
     check_planner(name)
 
 
-@pytest.mark.parametrize("priority", ["weighted", "greedy", "levin", lambda outlook: -outlook.log_policy])
+@pytest.mark.parametrize("priority", ["weighted", "greedy", "levin", lambda partial: -partial.log_policy])
 def test_any_priority_leaves_best_first_complete(priority) -> None:
     check_planner(BestFirst(priority=priority), seeds=6)
 
@@ -131,7 +132,7 @@ def test_only_astar_claims_to_be_optimal() -> None:
 def test_levin_is_depth_over_probability() -> None:
     from planners.priorities import levin
 
-    assert levin(Outlook(4, 0.0, 0.0, np.log(0.5))) == pytest.approx(np.log(8))
+    assert levin(PartialPlan(4, 0.0, 0.0, np.log(0.5))) == pytest.approx(np.log(8))
 
 
 @pytest.mark.parametrize("planner", [SwapRepair(), Backtracking(), BestFirst()])

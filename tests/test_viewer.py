@@ -370,7 +370,7 @@ def test_panels_escape_what_names_hold(shown):
         steps=(evil,),
         settings=evil,
         sentence=evil,
-        refusals=(ns.Refusal((evil,), evil, evil), ns.Refusal((), evil, evil)),
+        refusals=(refused(evil, evil, after=(evil,)), refused(evil, evil)),
     )
     scores = ns.OrderScores.uniform(1, [evil])
     world = ns.Assembly.from_cells({evil: [(0, 0, 0)], "b": [(0, 0, 1)]})
@@ -461,9 +461,9 @@ def test_where_there_is_no_plan_the_panel_says_why(shown):
 
 def test_attempts_come_in_order_with_the_plan_between():
     refusals = (
-        ns.Refusal((), "b", "b is under a"),
-        ns.Refusal(("a",), "c", "c is fixed"),
-        ns.Refusal(("a", "x"), "y", "elsewhere"),
+        refused("b", "b is under a"),
+        refused("c", "c is fixed", after=("a",)),
+        refused("y", "elsewhere", after=("a", "x")),
     )
     search = make_search(("a", "b"), refusals)
     text = attempts(search)
@@ -474,8 +474,8 @@ def test_attempts_come_in_order_with_the_plan_between():
 
 
 def test_of_many_refusals_those_about_the_one_looked_at_are_listed():
-    many = [ns.Refusal((), f"a{i}", f"reason {i}.") for i in range(1, 2 * MOST_REFUSALS + 8)]
-    many[-1] = ns.Refusal(("x",), "late", "reason late.")
+    many = [refused(f"a{i}", f"reason {i}.") for i in range(1, 2 * MOST_REFUSALS + 8)]
+    many[-1] = refused("late", "reason late.", after=("x",))
     search = make_search(("x", "y"), tuple(many))
     for around, first, last in [(0, 1, 300), (1, 1, 300), (300, 1, 300), (301, 301, 600), (606, 601, 607)]:
         text = attempts(search, around)
@@ -487,17 +487,21 @@ def test_of_many_refusals_those_about_the_one_looked_at_are_listed():
 
 
 def test_what_was_refused_most_often_is_counted():
-    few = tuple(ns.Refusal((), "a", "why") for _ in range(FEW))
+    few = tuple(refused("a", "why") for _ in range(FEW))
     assert most_refused(make_search((), few)) == ""
-    others = (ns.Refusal((), "b", "once"), ns.Refusal((), "a", "else"))
+    others = (refused("b", "once"), refused("a", "else"))
     text = most_refused(make_search((), few + others))
     assert f"<b>a</b> {FEW + 1}×: why" in text
     assert f"({FEW}×)" in text
     assert "<b>b</b> 1×: once</li>" in text
     assert text.index("<b>a</b>") < text.index("<b>b</b>")
-    many = most_refused(make_search((), tuple(ns.Refusal((), f"a{i}", "r") for i in range(FEW + 10))))
+    many = most_refused(make_search((), tuple(refused(f"a{i}", "r") for i in range(FEW + 10))))
     assert many.count("<li>") == MOST_COUNTED
     assert f"and {FEW + 10 - MOST_COUNTED} more actions" in many
+
+
+def refused(action, reason, *, after=()):
+    return ns.Rejection(reason, action=action, after=after)
 
 
 def make_search(steps, refusals):

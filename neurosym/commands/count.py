@@ -26,7 +26,8 @@ def count(
     Where the budget ends first there is no number, and the exit code says so.
     """
     from neurosym.pipeline import count_orders
-    from neurosym.planning.planner import Budget, Status
+    from neurosym.planning.budget import Budget
+    from neurosym.planning.result import Status
 
     problem = problem_at(path, files, removal.given())
     found = count_orders(problem, budget=Budget(seconds=seconds, expansions=expansions))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from neurosym.planning.planner import Status
+from neurosym.planning.result import Status
 
 #: `doctor` found something amiss, or `replay` something that moved; also what typer leaves with when the reader of a
 #: pipe has gone.

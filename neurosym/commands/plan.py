@@ -33,7 +33,7 @@ from neurosym.support.words import joined
 
 if TYPE_CHECKING:
     from neurosym.language.problem import Problem
-    from neurosym.planning.planner import PlanResult
+    from neurosym.planning.result import PlanResult
 
 #: The prior for assemblies, unless another is named.
 UNTRAINED = "outermost-first"
@@ -92,7 +92,7 @@ def plan(
     from neurosym.experiments.benchmark import NO_PRIOR
     from neurosym.geometry.readers.references import reference
     from neurosym.pipeline import plans, solve
-    from neurosym.planning.planner import Budget
+    from neurosym.planning.budget import Budget
     from neurosym.registry import load_domain
 
     path = _path(what, number, cells)

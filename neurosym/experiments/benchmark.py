@@ -23,8 +23,9 @@ from neurosym.experiments.engines import cores, run_tasks
 from neurosym.experiments.journal import Journal, key_of
 from neurosym.language.options import check_options
 from neurosym.language.problem_family import Progress
-from neurosym.planning.planner import Budget
-from neurosym.planning.prior import OrderScores, Prior
+from neurosym.planning.budget import Budget
+from neurosym.planning.order_scores import OrderScores
+from neurosym.planning.prior import Prior
 from neurosym.registry import load_domain, load_planner, load_prior
 
 #: The name of planning without a prior, in tables and on the command line.

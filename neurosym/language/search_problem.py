@@ -8,7 +8,7 @@ the planner knowing.
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ class Step(Generic[S]):
 
 @dataclass(frozen=True, slots=True)
 class Rejection:
-    """An attempt that was refused, and why.
+    """An attempt answered no, and why. An oracle gives the reason; a search's log adds what was attempted, and when.
 
     Attributes:
         reason: one sentence for a person.
@@ -69,8 +69,10 @@ class Rejection:
             names itself. Planners prune by it, so it must be sound.
         unconditional: the promise holds in every state of the problem before one of `until` is done, not only in
             those reached from this one: what was learned in one branch of a search serves in all.
-        proved: whether the action is impossible for certain. A planner that met a refusal which is not must not call
-            a problem unsolvable (`SearchLog.failed` sees to it).
+        proved: whether the action is impossible for certain. A planner that met a rejection which is not must not
+            call a problem unsolvable (`SearchLog.failed` sees to it).
+        action: name of the action, in a result (`PlanResult.blame`).
+        after: names of the actions that were done before it, likewise.
     """
 
     reason: str
@@ -78,6 +80,8 @@ class Rejection:
     until: tuple[int, ...] = ()
     unconditional: bool = False
     proved: bool = True
+    action: str = field(default="", kw_only=True)
+    after: tuple[str, ...] = field(default=(), kw_only=True)
 
 
 class SearchProblem(Protocol[S]):

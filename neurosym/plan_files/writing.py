@@ -9,7 +9,7 @@ from neurosym import __version__
 
 if TYPE_CHECKING:
     from neurosym.language.problem import Problem
-    from neurosym.planning.planner import PlanResult
+    from neurosym.planning.result import PlanResult
 
 #: Of the file. Raise it when a reader of the old one would go wrong.
 SCHEMA = 1

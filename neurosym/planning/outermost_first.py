@@ -11,7 +11,8 @@ from neurosym.errors import InputError
 from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.blocking.directions import Directions
 from neurosym.geometry.queries import AssemblyGeometry
-from neurosym.planning.prior import OrderScores, Prior
+from neurosym.planning.order_scores import OrderScores
+from neurosym.planning.prior import Prior
 from neurosym.support.bitsets import bits
 
 if TYPE_CHECKING:

@@ -1,176 +1,20 @@
-"""Priors: guesses, made before any search, about which action belongs at which step.
-
-A prior answers with `OrderScores`, a table of log-probabilities. The best whole order under it is a
-maximum-weight assignment (the Hungarian algorithm), as in Burke, Subr, Ramamoorthy (RA-L 2021), Sec. III-B.
-"""
+"""Priors: what gives order scores for problems, before any search."""
 
 from __future__ import annotations
 
-import math
 import zlib
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import linear_sum_assignment
 
 from neurosym.errors import InputError
+from neurosym.planning.order_scores import OrderScores
 
 if TYPE_CHECKING:
     from neurosym.language.problem import Problem
-
-#: Least log-probability a score may have (nats). A prior that is sure still leaves every order a finite cost.
-LOG_FLOOR = -30.0
-
-
-@dataclass(frozen=True, eq=False)
-class OrderScores:
-    """A prior's answer: how likely each action is at each step.
-
-    Attributes:
-        log_prob: float64, shape (n_steps, n_actions). Rows of exp() sum to one. It is copied, refused if it
-            has NaN or +inf, floored at `LOG_FLOOR` and normalised by rows.
-        actions: names of the actions, one a column; may be empty when there are no names.
-        log_length: float64, shape (n_steps + 1,): log-probability that the task takes 0 .. n_steps steps, or
-            None when it takes n_steps for sure.
-        classes: one integer an action; the cost of an action is that of its class (interchangeable actions
-            share their probability). Default: each action is its own class.
-    """
-
-    log_prob: NDArray[np.float64]
-    actions: tuple[str, ...] = ()
-    log_length: NDArray[np.float64] | None = None
-    classes: tuple[int, ...] = ()
-
-    def __post_init__(self) -> None:
-        table = np.array(self.log_prob, dtype=np.float64)
-        if table.ndim != 2:
-            raise InputError(f"Expected log_prob of shape (n_steps, n_actions); got shape {table.shape}.")
-        if np.isnan(table).any() or np.isposinf(table).any():
-            raise InputError("Expected log_prob without NaN and +inf; got some. Check the network that made it.")
-        n_steps, n_actions = table.shape
-        if n_steps > n_actions:
-            raise InputError(f"Expected at most as many steps as actions, each usable once; got {table.shape}.")
-        object.__setattr__(self, "log_prob", _normalised(table))
-        object.__setattr__(self, "actions", tuple(self.actions))
-        object.__setattr__(self, "classes", tuple(int(c) for c in self.classes) or tuple(range(n_actions)))
-        if self.actions and len(self.actions) != n_actions:
-            raise InputError(f"Expected {n_actions} action names, one a column; got {len(self.actions)}.")
-        if len(self.classes) != n_actions:
-            raise InputError(f"Expected {n_actions} classes, one an action; got {len(self.classes)}.")
-        if self.log_length is not None:
-            length = np.array(self.log_length, dtype=np.float64)
-            if length.shape != (n_steps + 1,) or np.isnan(length).any():
-                raise InputError(f"Expected log_length of shape ({n_steps + 1},) without NaN; got {length.shape}.")
-            object.__setattr__(self, "log_length", _normalised(length[None])[0])
-
-    @classmethod
-    def uniform(cls, n_steps: int, actions: Sequence[str], classes: Sequence[int] = ()) -> OrderScores:
-        """Every action equally likely at every step."""
-        n = len(actions)
-        return cls(np.full((n_steps, n), -math.log(max(n, 1))), tuple(actions), classes=tuple(classes))
-
-    @classmethod
-    def from_order(cls, order: Sequence[int], actions: Sequence[str], *, confidence: float = 0.99) -> OrderScores:
-        """Scores that believe in one order (indices of actions), each step with probability `confidence`."""
-        n = len(actions)
-        table = np.full((len(order), n), math.log(max((1 - confidence) / max(n - 1, 1), 1e-300)))
-        table[np.arange(len(order)), list(order)] = math.log(confidence)
-        return cls(table, tuple(actions))
-
-    @property
-    def n_steps(self) -> int:
-        return int(self.log_prob.shape[0])
-
-    @property
-    def n_actions(self) -> int:
-        return int(self.log_prob.shape[1])
-
-    @cached_property
-    def costs(self) -> NDArray[np.float64]:
-        """float64 (n_steps, n_actions): -log of the summed probability of each action's class (nats, >= 0)."""
-        ids, column = np.unique(np.asarray(self.classes), return_inverse=True)
-        if len(ids) == self.n_actions:
-            return np.maximum(-self.log_prob, 0.0)
-        member = np.zeros((self.n_actions, len(ids)))
-        member[np.arange(self.n_actions), column] = 1.0
-        summed = np.log(np.exp(self.log_prob) @ member)
-        costs: NDArray[np.float64] = np.maximum(-summed, 0.0)[:, column]
-        return costs
-
-    def cost(self, step: int, action: int) -> float:
-        """-log P(class of `action` at `step`) in nats; beyond the last step, that of the floor."""
-        return float(self.costs[step, action]) if step < self.n_steps else -LOG_FLOOR
-
-    def plan_cost(self, plan: Sequence[int]) -> float:
-        """The cost of a whole order (indices of actions), with that of its length where lengths are unsure."""
-        total = sum(self.cost(i, a) for i, a in enumerate(plan))
-        return float(total) + self.length_cost(len(plan))
-
-    def length_cost(self, n: int) -> float:
-        """-log P(the task takes n steps) in nats; 0 where the length is sure."""
-        if self.log_length is None:
-            return 0.0
-        return -float(self.log_length[n]) if n <= self.n_steps else -LOG_FLOOR
-
-    def order(self, rng: np.random.Generator | None = None) -> tuple[int, ...]:
-        """The likeliest order: the assignment of actions to steps of least total cost.
-
-        With an unsure length, the least over the lengths. Equal costs are broken by `rng` (None: a fixed seed).
-        """
-        rng = rng or np.random.default_rng(0)
-        costs = self.costs + rng.random(self.costs.shape) * 1e-9
-        if self.log_length is None:
-            return tuple(int(c) for c in linear_sum_assignment(costs)[1])
-        best: tuple[float, tuple[int, ...]] = (math.inf, ())
-        for n in range(self.n_steps + 1):
-            rows, columns = linear_sum_assignment(costs[:n])
-            total = float(costs[rows, columns].sum()) + self.length_cost(n)
-            if total < best[0]:
-                best = (total, tuple(int(c) for c in columns))
-        return best[1]
-
-    def names(self, rng: np.random.Generator | None = None) -> tuple[str, ...]:
-        """`order()` as names of actions."""
-        order = self.order(rng)
-        return tuple(self.actions[a] for a in order) if self.actions else tuple(map(str, order))
-
-    def restricted(self, actions: Sequence[str]) -> OrderScores:
-        """The scores for a task of which some actions are done already: the last steps, the remaining columns.
-
-        Args:
-            actions: the names that are left, each one of `self.actions`.
-        """
-        if tuple(actions) == self.actions:
-            return self
-        missing = [a for a in actions if a not in self.actions]
-        if missing:
-            raise InputError(
-                f"Expected actions that this prior knows ({', '.join(self.actions)}); got also {', '.join(missing)}. "
-                "Train a prior on this domain, or plan without one."
-            )
-        columns = [self.actions.index(a) for a in actions]
-        done = self.n_actions - len(columns)
-        rows = self.log_prob[min(done, self.n_steps) :]
-        length = None if self.log_length is None else self.log_length[min(done, self.n_steps) :]
-        classes = tuple(self.classes[c] for c in columns)
-        return OrderScores(rows[:, columns], tuple(actions), length, classes)
-
-
-def _normalised(table: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Rows that sum to one in exp(), none below the floor (rows of nothing but -inf become uniform)."""
-    if table.size == 0:
-        return table
-    top = table.max(axis=1, keepdims=True)
-    shifted = np.where(np.isfinite(top), table - np.where(np.isfinite(top), top, 0.0), 0.0)
-    shifted = shifted - np.log(np.exp(shifted).sum(axis=1, keepdims=True))
-    floored = np.maximum(shifted, LOG_FLOOR)
-    result: NDArray[np.float64] = floored - np.log(np.exp(floored).sum(axis=1, keepdims=True))
-    return result
 
 
 class Prior(ABC):

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from neurosym.planning.prior import OrderScores
+from neurosym.planning.order_scores import OrderScores
 from neurosym.plotting.errors import write_shares
 from neurosym.plotting.labels import shortened, without_common
 from neurosym.plotting.style import COLOURS, COLUMN, SMALL, TITLE, add_legend, mark, tidy

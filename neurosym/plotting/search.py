@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from neurosym.planning.planner import PlanResult
+from neurosym.planning.result import PlanResult
 from neurosym.plotting.labels import shortened, width_of, without_common
 from neurosym.plotting.style import COLOURS, COLUMN, TITLE, add_legend, mark, tidy
 

@@ -6,7 +6,7 @@ Claims (`PlannerTraits`) are compared with brute force; counts with those of an 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -14,8 +14,11 @@ import numpy as np
 
 from neurosym.errors import ContractError
 from neurosym.language.search_problem import SearchProblem, Step
-from neurosym.planning.planner import MAX_BLAME, Budget, Planner, PlanResult, Status
-from neurosym.planning.prior import OrderScores
+from neurosym.planning.budget import Budget
+from neurosym.planning.order_scores import OrderScores
+from neurosym.planning.planner import KBestPlanner, Planner
+from neurosym.planning.result import PlanResult, Status
+from neurosym.planning.search_log import MAX_BLAME
 from neurosym.registry import load_planner
 from neurosym.testing.toys import NumberLine, Removal, Table, Tiles, brute_force_plans
 from neurosym.testing.wrapped import Counting, Relabelled, Unproved
@@ -203,12 +206,11 @@ def _check_optimality(planner: Planner, toy: Toy, scores: OrderScores, result: P
 def _check_k_best(planner: Planner, toy: Toy, scores: OrderScores, where: str) -> None:
     if not planner.traits.k_best:
         return
-    method: Callable[..., list[PlanResult]] | None = getattr(planner, "plans", None)
-    if method is None:
+    if not isinstance(planner, KBestPlanner):
         raise ContractError(f"{where}: expected a method plans(problem, scores, *, k, budget, rng), as k_best claims.")
     costs = sorted(_cost(toy.problem, scores, plan) for plan in toy.plans)
     for k in (1, 3, len(costs) + 1):
-        found = method(toy.problem, scores, k=k, rng=np.random.default_rng(3))
+        found = planner.plans(toy.problem, scores, k=k, rng=np.random.default_rng(3))
         got = [result.cost if result.cost is not None else np.nan for result in found]
         close = len(got) == len(costs[:k]) and np.allclose(got, costs[:k], rtol=0, atol=TOLERANCE)
         _require(bool(close), where, f"the {k} least costs {costs[:k]}", got)

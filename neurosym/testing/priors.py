@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from neurosym.errors import ContractError
-from neurosym.planning.prior import OrderScores, Prior
+from neurosym.planning.order_scores import OrderScores
+from neurosym.planning.prior import Prior
 
 if TYPE_CHECKING:
     from neurosym.language.problem import Problem

@@ -71,7 +71,7 @@ class Relabelled(Wrapped[S]):
         answer = self.problem.attempt(state, self.order[action])
         if isinstance(answer, Rejection):
             until = tuple(self.order.index(a) for a in answer.until)
-            return Rejection(answer.reason, answer.because, until, answer.unconditional)
+            return replace(answer, until=until)
         return answer
 
 

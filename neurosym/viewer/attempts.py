@@ -7,7 +7,7 @@ from html import escape
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from neurosym.planning.planner import Refusal
+    from neurosym.language.search_problem import Rejection
     from neurosym.viewer.shown import Search
 
 #: Refusals written out at a time; a hard search has thousands.
@@ -75,7 +75,7 @@ def _kept(step: int, action: str) -> str:
     return f"<p style='margin:2px 0;color:#00724f'><b>✔ {step + 1}. {escape(action)}</b></p>"
 
 
-def refused(number: int, refusal: Refusal) -> str:
+def refused(number: int, refusal: Rejection) -> str:
     """One refused attempt, with its reason."""
     after = escape(", ".join(refusal.after)) or "nothing"
     return (
@@ -84,7 +84,7 @@ def refused(number: int, refusal: Refusal) -> str:
     )
 
 
-def looked_at(number: int, refusal: Refusal) -> str:
+def looked_at(number: int, refusal: Rejection) -> str:
     """The refusal that the 3D view shows, and what its colours mean."""
     legend = "in the view: <b style='color:#d55e00'>what was refused</b>"
     if refusal.because:

@@ -14,7 +14,8 @@ from neurosym.errors import InputError, UnknownNameError
 from neurosym.language.options import check_options
 from neurosym.language.problem import Problem
 from neurosym.pipeline import ORACLES, advice, solve
-from neurosym.planning.planner import Budget, SearchLog
+from neurosym.planning.budget import Budget
+from neurosym.planning.search_log import SearchLog
 from neurosym.registry import load_domain, planner_names, prior_names
 from neurosym.viewer.shown import REFUSED, Maker, Query, Search, Shown
 

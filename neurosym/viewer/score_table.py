@@ -8,7 +8,7 @@ from html import escape
 import numpy as np
 from numpy.typing import NDArray
 
-from neurosym.planning.prior import OrderScores
+from neurosym.planning.order_scores import OrderScores
 from neurosym.viewer.panels import WIDTH, as_data
 
 #: A table of scores with more columns leaves out those that are neither likely at any step nor taken.

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from neurosym.errors import InputError, NeurosymError
 from neurosym.geometry.step_motion import StepMotion
 from neurosym.language.problem import Problem
-from neurosym.language.search_problem import Step
+from neurosym.language.search_problem import Rejection, Step
 from neurosym.pipeline import advice
-from neurosym.planning.planner import PlanResult, Refusal, Status
-from neurosym.planning.prior import OrderScores
+from neurosym.planning.order_scores import OrderScores
+from neurosym.planning.result import PlanResult, Status
 from neurosym.planning.staging import stage
 from neurosym.planning.validation import validate
 from neurosym.viewer.timeline import Timeline
@@ -75,7 +75,7 @@ class Search:
     motions: tuple[StepMotion | None, ...]
     status: Status
     sentence: str
-    refusals: tuple[Refusal, ...]
+    refusals: tuple[Rejection, ...]
     counts: Mapping[str, float]
     settings: str
     scores: OrderScores | None = None
@@ -111,7 +111,7 @@ class Search:
         try:
             status = Status[document["status"]]
             refusals = tuple(
-                Refusal(tuple(r["after"]), str(r["action"]), str(r["reason"]), tuple(r["because"]))
+                Rejection(str(r["reason"]), tuple(r["because"]), action=str(r["action"]), after=tuple(r["after"]))
                 for r in document["refusals"]
             )
             counts = {name: document[name] for name in _COUNTS if isinstance(document[name], int | float)}

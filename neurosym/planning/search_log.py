@@ -1,0 +1,107 @@
+"""The log that every planner keeps while it searches, so that planners are compared in one unit."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Sequence
+from dataclasses import replace
+from time import perf_counter
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
+
+from neurosym.language.search_problem import Rejection, SearchProblem, Step
+from neurosym.planning.budget import Budget
+from neurosym.planning.order_scores import OrderScores
+from neurosym.planning.result import Plan, PlanResult, Status
+
+if TYPE_CHECKING:
+    from neurosym.geometry.step_motion import StepMotion
+
+S = TypeVar("S", bound=Hashable)
+
+#: Rejections kept as evidence in a result. Beyond it only the count goes on: a hard search would fill the memory.
+MAX_BLAME = 10_000
+
+
+class SearchLog(Generic[S]):
+    """Counts, budget, evidence and best prefix of one search. Every attempt of a planner goes through it."""
+
+    def __init__(self, problem: SearchProblem[S], budget: Budget | None = None) -> None:
+        self.problem = problem
+        self.budget = budget or Budget()
+        self.attempts = 0
+        self.expansions = 0
+        self.iterations = 0
+        self.best_prefix: tuple[int, ...] = ()
+        self.all_proved = True  # whether every rejection so far was certain
+        self.rejections: list[Rejection] = []  # the first `MAX_BLAME`
+        self._names = tuple(problem.actions)
+        self._start = perf_counter()
+
+    @property
+    def seconds(self) -> float:
+        return perf_counter() - self._start
+
+    def out_of_budget(self) -> bool:
+        """Whether a limit has been reached: ask before every attempt and every expansion."""
+        b = self.budget
+        return (
+            (b.attempts is not None and self.attempts >= b.attempts)
+            or (b.expansions is not None and self.expansions >= b.expansions)
+            or (b.seconds is not None and self.seconds >= b.seconds)
+            or (b.watch is not None and b.watch(self))
+        )
+
+    def candidates(self, state: S) -> Sequence[int]:
+        """The candidates of `state`; counts one expansion."""
+        self.expansions += 1
+        return tuple(self.problem.candidates(state))
+
+    def attempt(self, prefix: tuple[int, ...], state: S, action: int) -> Step[S] | Rejection:
+        """Ask the oracle for `action` after `prefix`, which led to `state`; counts one attempt."""
+        self.attempts += 1
+        answer = self.problem.attempt(state, action)
+        if isinstance(answer, Rejection):
+            self._keep(prefix, action, answer)
+        elif len(prefix) >= len(self.best_prefix):
+            self.best_prefix = (*prefix, action)
+        return answer
+
+    def refuse(self, prefix: tuple[int, ...], action: int, reason: str) -> None:
+        """Note a guess that failed without asking the oracle (not a candidate): an iteration, no attempt."""
+        self._keep(prefix, action, Rejection(reason))
+
+    def _keep(self, prefix: tuple[int, ...], action: int, rejection: Rejection) -> None:
+        self.iterations += 1
+        self.all_proved = self.all_proved and rejection.proved
+        if len(self.rejections) < MAX_BLAME:
+            self.rejections.append(replace(rejection, action=self._names[action], after=self.names(prefix)))
+
+    def names(self, actions: Sequence[int]) -> tuple[str, ...]:
+        return tuple([self._names[a] for a in actions])
+
+    def solved(
+        self,
+        plan: Sequence[int],
+        motions: Sequence[StepMotion | None] = (),
+        *,
+        scores: OrderScores | None = None,
+        first_guess_failed: bool | None = None,
+    ) -> PlanResult:
+        """The result for a plan, given as indices of actions."""
+        named, cost = Plan(self.names(plan), motions), None if scores is None else scores.plan_cost(plan)
+        return self._result(Status.SOLVED, named, tuple(named), first_guess_failed, motions=named.motions, cost=cost)
+
+    def failed(self, status: Status, *, first_guess_failed: bool | None = None) -> PlanResult:
+        """The result for a search that ended without a plan.
+
+        What was rejected without proof leaves nothing proved: UNSOLVABLE then becomes GAVE_UP.
+        """
+        if status is Status.UNSOLVABLE and not self.all_proved:
+            status = Status.GAVE_UP
+        return self._result(status, None, self.names(self.best_prefix), first_guess_failed)
+
+    def _result(
+        self, status: Status, plan: Plan | None, best_prefix: tuple[str, ...], failed: bool | None, **rest: Any
+    ) -> PlanResult:
+        counts = (self.iterations, self.expansions, self.attempts, self.seconds)
+        blame = tuple(self.rejections)
+        return PlanResult(status, plan, *counts, best_prefix, blame, first_guess_failed=failed, **rest)

@@ -1,0 +1,129 @@
+"""What one search knows, whatever its algorithm: answers, nogoods, preferred actions, budget and log."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from neurosym.errors import InputError
+from neurosym.language.search_problem import Rejection, SearchProblem, Step
+from neurosym.planning.budget import Budget
+from neurosym.planning.order_scores import OrderScores
+from neurosym.planning.result import PlanResult, Status
+from neurosym.planning.search_log import SearchLog
+from planners.node import Node
+from planners.nogoods import Nogoods
+from planners.preferred_actions import PreferredActions
+
+
+class BudgetSpent(Exception):
+    """Ends a search where it stands; `SearchPlanner` makes a result of it."""
+
+
+class SearchContext:
+    """One search of one problem. Expansions and attempts look at the budget first, and raise `BudgetSpent`.
+
+    Attributes:
+        scores: checked against the problem's actions, with interchangeable actions sharing their probability.
+        deviated: whether the search had to leave the first complete order that it tried.
+    """
+
+    def __init__(
+        self,
+        problem: SearchProblem[Any],
+        scores: OrderScores | None = None,
+        budget: Budget | None = None,
+        rng: np.random.Generator | None = None,
+    ) -> None:
+        self.problem = problem
+        self.classes = tuple(problem.classes)
+        self.scores = None if scores is None else _fitted(scores, tuple(problem.actions), self.classes)
+        self.rng = rng or np.random.default_rng(0)
+        self.log = SearchLog(problem, budget)
+        self.nogoods = Nogoods()
+        self.preferred = PreferredActions(problem.actions)
+        self.deviated = False
+        self._answers: dict[tuple[Any, int], Step[Any] | Rejection] = {}
+
+    def check_budget(self) -> None:
+        if self.log.out_of_budget():
+            raise BudgetSpent
+
+    def expand(self, state: Any, used: int) -> list[int]:
+        """The unused candidates, one a class, by index: counts one expansion.
+
+        Of interchangeable actions that are both unused, neither has left a trace in the state, so one speaks for both.
+        """
+        self.check_budget()
+        first: dict[int, int] = {}
+        for action in sorted(self.log.candidates(state)):
+            if not used >> action & 1:
+                first.setdefault(self.classes[action], action)
+        return list(first.values())
+
+    def attempt(self, node: Node, action: int) -> Step[Any] | Rejection:
+        """The oracle's answer, which is asked once for each state and action."""
+        answer = self._answers.get((node.state, action))
+        if answer is None:
+            self.check_budget()
+            answer = self._answers[node.state, action] = self.log.attempt(node.prefix(), node.state, action)
+        return answer
+
+    def learn(self, node: Node, action: int, rejection: Rejection) -> None:
+        """Keep what the rejection of `action` at `node` promises, and what it names."""
+        self.nogoods.learn(node, action, rejection)
+        self.preferred.learn(rejection, node.used | 1 << action)
+
+    def restated(self, completion: tuple[int, ...], options: Sequence[int]) -> tuple[int, ...]:
+        """The completion, its first action exchanged for the interchangeable one of `options`; empty without one."""
+        label = self.classes[completion[0]]
+        first = next((a for a in options if self.classes[a] == label), None)
+        if first in (None, completion[0]):
+            return () if first is None else completion
+        return (first, *(completion[0] if a == first else a for a in completion[1:]))
+
+    def cost(self, step: int, action: int) -> float:
+        """Of `action` at `step` under the scores (nats); 0 without any."""
+        return 0.0 if self.scores is None else self.scores.cost(step, action)
+
+    def length_cost(self, steps: int) -> float:
+        """Of a plan's length under the scores (nats); 0 without any."""
+        return 0.0 if self.scores is None else self.scores.length_cost(steps)
+
+    def solved(self, node: Node) -> PlanResult:
+        """The result for the plan that led to `node`."""
+        motions, failed = [at.motion for at in node.path()], self.deviated or self.log.iterations > 0
+        return self.log.solved(node.prefix(), motions, scores=self.scores, first_guess_failed=failed)
+
+    def failed(self, status: Status) -> PlanResult:
+        """The result for a search without a plan."""
+        return self.log.failed(status, first_guess_failed=self.deviated or self.log.iterations > 0 or None)
+
+
+def _fitted(scores: OrderScores, names: tuple[str, ...], classes: Sequence[int]) -> OrderScores:
+    """The scores with the classes of the problem joined to their own.
+
+    Raises:
+        InputError: the scores are about other actions.
+    """
+    if scores.n_actions != len(names):
+        raise InputError(
+            f"Expected scores with one column an action, {len(names)} in all; got {scores.n_actions}. "
+            "Take scores.restricted(problem.actions) when some actions are done already."
+        )
+    if scores.actions and scores.actions != names:
+        raise InputError(
+            f"Expected scores for the actions {', '.join(names)}, in this order; got {', '.join(scores.actions)}. "
+            "Take scores.restricted(problem.actions)."
+        )
+    joined = list(range(len(names)))
+    for given in (classes, scores.classes):
+        members: dict[int, int] = {}
+        for action, label in enumerate(given):
+            old, new = joined[action], joined[members.setdefault(label, action)]
+            if old != new:
+                joined = [new if other == old else other for other in joined]
+    return scores if len(set(joined)) == len(set(scores.classes)) else replace(scores, classes=tuple(joined))
