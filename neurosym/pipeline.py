@@ -15,11 +15,12 @@ from neurosym.errors import ContractError, InputError
 from neurosym.language.problem import Problem
 from neurosym.language.search_problem import SearchProblem
 from neurosym.planning.budget import Budget
+from neurosym.planning.guard import guarded
 from neurosym.planning.order_scores import OrderScores
-from neurosym.planning.planner import Planner
+from neurosym.planning.planner import KBestPlanner, OrderCounter, Planner
 from neurosym.planning.prior import Prior
 from neurosym.planning.result import OrderCount, PlanResult, Status
-from neurosym.planning.validation import replay, validate
+from neurosym.planning.validation import confirm, replay, validate
 from neurosym.registry import load_planner, load_prior
 
 ORACLES = ("geometry", "physics")
@@ -67,7 +68,7 @@ def plans(
 ) -> list[PlanResult]:
     """The k best plans, the likeliest first (planners whose traits say `k_best`); with None one, as `solve`."""
     searcher = load_planner(planner)
-    generator = _guarded(problem, searcher, k, budget, rng)
+    generator = guarded(problem, searcher, k, budget, rng)
     scores = advice(problem, prior)
     by_geometry, start = oracle == "geometry", time.perf_counter()
     if by_geometry and (why_not := problem.semantics.refute(problem)) is not None:
@@ -94,23 +95,16 @@ def search_and_check(
     Raises:
         ContractError: a plan does not survive its replay.
     """
-    if k is None:
-        results = [planner.plan(search, scores, budget=budget, rng=rng)]
+    if k is not None and isinstance(planner, KBestPlanner):
+        results = planner.plans(search, scores, k=k, budget=budget, rng=rng)
     else:
-        results = planner.plans(search, scores, k=k, budget=budget, rng=rng)  # type: ignore[attr-defined]
+        results = [planner.plan(search, scores, budget=budget, rng=rng)]
     for result in results:
-        if result.plan is None:
-            continue
-        if oracle == "geometry":
-            replayed = validate(problem, result.plan, result.motions)
-        else:
+        if result.plan is not None and oracle == "geometry":
+            confirm(planner, result.plan, validate(problem, result.plan, result.motions))
+        elif result.plan is not None:
             with open_oracle(problem, oracle) as fresh:
-                replayed = replay(fresh, result.plan)
-        if not replayed.ok:
-            raise ContractError(
-                f"The planner {type(planner).__name__} answered with the plan {', '.join(result.plan)}, which fails "
-                f"its replay: {replayed.reason} This is a fault of the planner or of the oracle; please report it."
-            )
+                confirm(planner, result.plan, replay(fresh, result.plan))
     return results
 
 
@@ -144,8 +138,9 @@ def open_oracle(problem: Problem, oracle: str) -> Iterator[SearchProblem[Any]]:
 
 def count_plans(problem: Problem) -> int:
     """How many different orders solve a problem: exact, by dynamic programming over states."""
-    count: int = load_planner("exhaustive").count_plans(problem.ground())  # type: ignore[attr-defined]
-    return count
+    orders = _counter().count_orders(problem.ground()).orders
+    assert orders is not None  # no budget could end it
+    return orders
 
 
 def count_orders(problem: Problem, *, budget: Budget | None = None) -> OrderCount:
@@ -153,9 +148,13 @@ def count_orders(problem: Problem, *, budget: Budget | None = None) -> OrderCoun
     start = time.perf_counter()
     if problem.semantics.refute(problem) is not None:
         return OrderCount(0, True, 0, time.perf_counter() - start)
+    return _counter().count_orders(problem.ground(), budget=budget)
+
+
+def _counter() -> OrderCounter:
     counter = load_planner("exhaustive")
-    counted: OrderCount = counter.count_orders(problem.ground(), budget=budget)  # type: ignore[attr-defined]
-    return counted
+    assert isinstance(counter, OrderCounter)
+    return counter
 
 
 def _explained(problem: Problem, result: PlanResult) -> PlanResult:
@@ -163,22 +162,3 @@ def _explained(problem: Problem, result: PlanResult) -> PlanResult:
     if result.status in (Status.SOLVED, Status.OUT_OF_BUDGET):
         return result
     return replace(result, why_not=problem.semantics.explain(problem, result.best_prefix))
-
-
-def _guarded(problem: object, planner: Planner, k: object, budget: object, rng: Any) -> np.random.Generator:
-    """What was given, checked; the generator."""
-    if k is not None and not planner.traits.k_best:
-        raise InputError(f"Expected a planner that gives several plans, best-first or exhaustive; got {planner!r}.")
-    if k is not None and not (isinstance(k, int | np.integer) and k >= 1):
-        raise InputError(f"Expected k of at least 1; got {k}.")
-    if not isinstance(problem, Problem):
-        raise InputError(f"Expected a Problem, as Domain.problem makes it; got {problem!r}.")
-    if budget is not None and not isinstance(budget, Budget):
-        raise InputError(f"Expected a Budget, for instance Budget(seconds=10); got {budget!r}.")
-    if isinstance(rng, np.random.Generator):
-        return rng
-    if rng is None:
-        return np.random.default_rng(0)
-    if isinstance(rng, int | np.integer) and not isinstance(rng, bool) and rng >= 0:
-        return np.random.default_rng(rng)
-    raise InputError(f"Expected rng as a numpy Generator or a seed of 0 or more; got {rng!r}.")

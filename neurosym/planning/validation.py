@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from neurosym.errors import InputError, UnknownNameError
+from neurosym.errors import ContractError, InputError, UnknownNameError
 from neurosym.geometry.step_motion import StepMotion, check_motions
 from neurosym.language.search_problem import Rejection, SearchProblem
 from neurosym.language.semantics import Validation as Validation
@@ -103,3 +103,16 @@ def replay(problem: SearchProblem[Any], order: Sequence[str]) -> Validation:
     if not problem.is_goal(state):
         return Validation(False, len(order), (), f"After all {len(order)} actions the goal is missed.")
     return Validation(True)
+
+
+def confirm(planner: object, plan: Sequence[str], replayed: Validation) -> None:
+    """Refuse a plan that did not survive its replay.
+
+    Raises:
+        ContractError: it did not.
+    """
+    if not replayed.ok:
+        raise ContractError(
+            f"The planner {type(planner).__name__} answered with the plan {', '.join(plan)}, which fails its replay: "
+            f"{replayed.reason} This is a fault of the planner or of the oracle; please report it."
+        )

@@ -1,0 +1,35 @@
+"""What `solve` refuses to be given."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from neurosym.errors import InputError
+from neurosym.language.problem import Problem
+from neurosym.planning.budget import Budget
+from neurosym.planning.planner import KBestPlanner, Planner
+
+
+def guarded(problem: object, planner: Planner, k: object, budget: object, rng: Any) -> np.random.Generator:
+    """Refuse what cannot be planned, before anything is done; gives the generator.
+
+    Raises:
+        InputError: k without a planner that gives several plans, or something else than was expected.
+    """
+    if k is not None and not (planner.traits.k_best and isinstance(planner, KBestPlanner)):
+        raise InputError(f"Expected a planner that gives several plans, best-first or exhaustive; got {planner!r}.")
+    if k is not None and not (isinstance(k, int | np.integer) and k >= 1):
+        raise InputError(f"Expected k of at least 1; got {k}.")
+    if not isinstance(problem, Problem):
+        raise InputError(f"Expected a Problem, as Domain.problem makes it; got {problem!r}.")
+    if budget is not None and not isinstance(budget, Budget):
+        raise InputError(f"Expected a Budget, for instance Budget(seconds=10); got {budget!r}.")
+    if isinstance(rng, np.random.Generator):
+        return rng
+    if rng is None:
+        return np.random.default_rng(0)
+    if isinstance(rng, int | np.integer) and not isinstance(rng, bool) and rng >= 0:
+        return np.random.default_rng(rng)
+    raise InputError(f"Expected rng as a numpy Generator or a seed of 0 or more; got {rng!r}.")
