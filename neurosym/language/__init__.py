@@ -1,5 +1,6 @@
 """The symbolic language: types, objects, fluents, derived predicates, actions, domains and problems."""
 
+from neurosym.language import predicates
 from neurosym.language.actions import Action
 from neurosym.language.domain import Domain
 from neurosym.language.grounding import GroundProblem
@@ -23,4 +24,5 @@ __all__ = [
     "Type",
     "Variable",
     "derived",
+    "predicates",
 ]
