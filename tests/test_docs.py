@@ -27,6 +27,8 @@ from neurosym.geometry.tolerances import DEFAULT_TOLERANCES
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
 PAGES = sorted(DOCS.rglob("*.md"))
+#: Its recipes run as pages do, and are short.
+RECIPES = ROOT / "CONTRIBUTING.md"
 #: What a page may leave out of an output, and times, which differ.
 GAP, TIME = "...", re.compile(r"\b\d+(?:\.\d+)? m?s\b")
 #: A comment above a block says why it does not run, with which exit codes its last command may leave, or as which file
@@ -100,7 +102,13 @@ def test_outputs_are_told_apart(shown, same):
     assert same_output(shown, "a\nb 3.1 ms\n") is same
 
 
-@pytest.mark.parametrize("page", [p for p in PAGES if runnable(p)], ids=lambda p: str(p.relative_to(DOCS)))
+def test_recipes_are_short():
+    recipes = runnable(RECIPES)
+    assert len(recipes) == 3
+    assert max(block["body"].count("\n") for block in recipes) < 25
+
+
+@pytest.mark.parametrize("page", [*(p for p in PAGES if runnable(p)), RECIPES], ids=lambda p: str(p.relative_to(ROOT)))
 def test_code_runs(page, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(str(tmp_path))
