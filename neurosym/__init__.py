@@ -15,7 +15,7 @@ Public names are resolved when first used: importing this package loads no heavy
 import lazy_loader
 
 __getattr__, _, _names = lazy_loader.attach_stub(__name__, __file__)
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 __all__ = [*_names, "__version__"]
 
 
