@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from itertools import pairwise
+from typing import ClassVar
 
 import torch
 from torch import Tensor, nn
@@ -17,9 +19,6 @@ from neurosym.errors import InputError, MissingDependencyError, UnknownNameError
 
 #: (V, H, W, 3): views, height, width, colours.
 PictureShape = tuple[int, int, int, int]
-
-#: Pixels of 0 to 255 are brought to about -1 to 1.
-_CENTRE, _SCALE = 127.5, 127.5
 
 
 class Encoder(nn.Module, ABC):
@@ -59,13 +58,7 @@ class SmallEncoder(Encoder):
     SIDE = 16
 
     def __init__(
-        self,
-        shape: PictureShape,
-        *,
-        hidden: int = 192,
-        view: int = 96,
-        out_features: int = 256,
-        dropout: float = 0.2,
+        self, shape: PictureShape, *, hidden: int = 192, view: int = 96, out_features: int = 256, dropout: float = 0.2
     ) -> None:
         super().__init__()
         self.out_features = out_features
@@ -80,7 +73,7 @@ class SmallEncoder(Encoder):
     def prepare(self, pictures: Tensor) -> Tensor:
         pooled = _pooled(pictures.flatten(0, 1), self.SIDE * self.down, self.SIDE * self.across)
         squares = pooled.reshape(-1, self.down, self.SIDE, self.across, self.SIDE, 3).transpose(2, 3)
-        return ((squares - _CENTRE) / _SCALE).reshape(len(pictures), -1, 3 * self.SIDE**2)
+        return _centred(squares).reshape(len(pictures), -1, 3 * self.SIDE**2)
 
     def forward(self, prepared: Tensor) -> Tensor:
         features: Tensor = self.all(self.each(prepared).flatten(1))
@@ -91,15 +84,29 @@ class SmallEncoder(Encoder):
 
 
 class _Stacked(Encoder):
-    """An encoder of views stacked as channels."""
+    """An encoder of views stacked as channels; they stay bytes until they are read, so that thousands stay resident."""
+
+    NAME: ClassVar[str]
+    LEAST: ClassVar[int]  #: pixels of the shorter side; below, the convolutions leave too little
+
+    def __init__(self, shape: PictureShape, out_features: int) -> None:
+        super().__init__()
+        views, height, width, _ = shape
+        if min(height, width) < self.LEAST:
+            raise InputError(
+                f"Expected pictures of at least {self.LEAST} x {self.LEAST} pixels for the encoder {self.NAME!r}; "
+                f"got {height} x {width}. Use encoder='small', or larger pictures."
+            )
+        self.out_features = out_features
+        self.places_shape = (views, SmallEncoder.SIDE, SmallEncoder.SIDE, 3)
 
     def prepare(self, pictures: Tensor) -> Tensor:
-        return _channels(pictures)
+        return pictures.permute(0, 1, 4, 2, 3).flatten(1, 2).contiguous()  # uint8 (B, 3 V, H, W)
 
     def places(self, prepared: Tensor) -> Tensor:
         views, rows, columns, _ = self.places_shape
         pooled = functional.adaptive_avg_pool2d(prepared.to(torch.float32), (rows, columns))
-        return ((pooled - _CENTRE) / _SCALE).reshape(-1, views, 3, rows, columns).permute(0, 1, 3, 4, 2)
+        return _centred(pooled).reshape(-1, views, 3, rows, columns).permute(0, 1, 3, 4, 2)
 
 
 class PaperEncoder(_Stacked):
@@ -108,37 +115,21 @@ class PaperEncoder(_Stacked):
     32, 64, pool, 128, pool, 256, pool (kernels 5 x 5, unpadded, ReLU; pools 2 x 2), dropout 0.5, 128 neurons, ReLU.
     """
 
-    LEAST = 40  #: pixels; below, the unpadded convolutions leave nothing
+    NAME, LEAST = "paper", 40
 
-    def __init__(self, shape: PictureShape, *, out_features: int = 128, dropout: float = 0.5) -> None:
-        super().__init__()
-        views, height, width, colours = shape
-        if min(height, width) < self.LEAST:
-            raise InputError(
-                f"Expected pictures of at least {self.LEAST} x {self.LEAST} pixels for the encoder 'paper'; "
-                f"got {height} x {width}. Use encoder='small', or larger pictures."
-            )
-        self.out_features = out_features
-        self.places_shape = (views, SmallEncoder.SIDE, SmallEncoder.SIDE, 3)
-        self.convolutions = nn.Sequential(
-            nn.Conv2d(views * colours, 32, 5),
-            nn.ReLU(),
-            nn.Conv2d(32, 64, 5),
-            nn.ReLU(),
-            nn.MaxPool2d(2),
-            nn.Conv2d(64, 128, 5),
-            nn.ReLU(),
-            nn.MaxPool2d(2),
-            nn.Conv2d(128, 256, 5),
-            nn.ReLU(),
-            nn.MaxPool2d(2),
-        )
-        left = [(((side - 8) // 2 - 4) // 2 - 4) // 2 for side in (height, width)]
-        self.dense = nn.Sequential(nn.Dropout(dropout), nn.Linear(256 * left[0] * left[1], out_features), nn.ReLU())
+    def __init__(self, shape: PictureShape) -> None:
+        super().__init__(shape, 128)
+        layers: list[nn.Module] = []
+        for before, after in pairwise((shape[0] * shape[3], 32, 64, 128, 256)):
+            layers += [nn.Conv2d(before, after, 5), nn.ReLU()]
+            if after > 32:
+                layers.append(nn.MaxPool2d(2))
+        self.convolutions = nn.Sequential(*layers)
+        rows, columns = ((((side - 8) // 2 - 4) // 2 - 4) // 2 for side in shape[1:3])
+        self.dense = nn.Sequential(nn.Dropout(0.5), nn.Linear(256 * rows * columns, self.out_features), nn.ReLU())
 
     def forward(self, prepared: Tensor) -> Tensor:
-        x = (prepared.to(torch.float32) - _CENTRE) / _SCALE
-        features: Tensor = self.dense(self.convolutions(x).flatten(1))
+        features: Tensor = self.dense(self.convolutions(_centred(prepared)).flatten(1))
         return features
 
 
@@ -147,16 +138,14 @@ class ResNetEncoder(_Stacked):
 
     Made for pictures of 224 pixels, it shrinks them 32 times. Here the first strides are left out, the pooling one
     and then that of the first convolution, until at least 4 x 4 places are left: 64 pixels are shrunk 16 times.
-
-    Raises:
-        MissingDependencyError: torchvision is not installed.
+    Raises `MissingDependencyError` where torchvision is not installed.
     """
 
-    LEAST = 16  #: pixels; below, less than 2 x 2 places are left
+    NAME, LEAST = "resnet18", 16
     PLACES = 4
 
     def __init__(self, shape: PictureShape) -> None:
-        super().__init__()
+        super().__init__(shape, 512)
         try:
             from torchvision.models import resnet18
         except ImportError:
@@ -164,35 +153,24 @@ class ResNetEncoder(_Stacked):
                 "Expected torchvision for the encoder 'resnet18'; it is not installed. "
                 "Install this package with its extra `vision`, or use encoder='small' or 'paper'."
             ) from None
-        views, height, width, colours = shape
-        side = min(height, width)
-        if side < self.LEAST:
-            raise InputError(
-                f"Expected pictures of at least {self.LEAST} x {self.LEAST} pixels for the encoder 'resnet18'; "
-                f"got {height} x {width}. Use encoder='small', or larger pictures."
-            )
         network: nn.Module = resnet18(weights=None)
-        self.out_features = 512
-        self.places_shape = (views, SmallEncoder.SIDE, SmallEncoder.SIDE, 3)
+        side = min(shape[1:3])
         pooled, halved = side >= 32 * self.PLACES, side >= 16 * self.PLACES
         kernel, stride = (7, 2) if pooled else (3, 2) if halved else (3, 1)
-        network.conv1 = nn.Conv2d(views * colours, 64, kernel, stride, padding=kernel // 2, bias=False)
+        network.conv1 = nn.Conv2d(shape[0] * shape[3], 64, kernel, stride, padding=kernel // 2, bias=False)
         if not pooled:
             network.maxpool = nn.Identity()
         network.fc = nn.Identity()
         self.network = network
 
     def forward(self, prepared: Tensor) -> Tensor:
-        features: Tensor = self.network((prepared.to(torch.float32) - _CENTRE) / _SCALE)
+        features: Tensor = self.network(_centred(prepared))
         return features
 
 
-def _channels(pictures: Tensor) -> Tensor:
-    """Views stacked as channels: uint8 (B, V, H, W, 3) -> uint8 (B, 3 V, H, W).
-
-    Kept as bytes: thousands of pictures stay resident while a network learns.
-    """
-    return pictures.permute(0, 1, 4, 2, 3).flatten(1, 2).contiguous()
+def _centred(colours: Tensor) -> Tensor:
+    """Colours of 0 to 255, brought to -1 to 1 in float32."""
+    return (colours.to(torch.float32) - 127.5) / 127.5
 
 
 def _pooled(views: Tensor, rows: int, columns: int) -> Tensor:
