@@ -52,15 +52,14 @@ def save_network(path: Path, network: OrderNetwork, header: Mapping[str, Any]) -
     """Write a network's weights in float16 (`fit` rounds them to it, so nothing is lost) and its header."""
     if path.suffix != ".safetensors":
         raise CheckpointError(f"Expected a file name that ends in .safetensors; got {path.name!r}.")
-    tensors = {name: _cast(tensor, torch.float16) for name, tensor in network.state_dict().items()}
+    tensors = in_precision(network.state_dict(), torch.float16)
     write_tensors(path, tensors, {**header, "network": network.config.to_json()})
 
 
 def load_network(path: Path) -> tuple[OrderNetwork, dict[str, Any]]:
     """A network in float32 on the CPU, ready to read, and its header."""
     tensors, header = read_tensors(path)
-    actions = header.get("actions")
-    given = header.get("network")
+    actions, given = header.get("actions"), header.get("network")
     if not isinstance(given, dict) or not isinstance(actions, list) or not all(isinstance(a, str) for a in actions):
         raise CheckpointError(f"Expected {path} to say in its header: prior, domain, actions, network; it does not.")
     config = NetworkConfig.from_json(given)
@@ -69,22 +68,20 @@ def load_network(path: Path) -> tuple[OrderNetwork, dict[str, Any]]:
     # On the meta device nothing is allocated or drawn: shapes are compared before memory is asked for.
     with torch.device("meta"):
         network = OrderNetwork(config)
-    expected = {name: tuple(tensor.shape) for name, tensor in network.state_dict().items()}
-    got = {name: tuple(tensor.shape) for name, tensor in tensors.items()}
+    expected, got = ({n: tuple(t.shape) for n, t in d.items()} for d in (network.state_dict(), tensors))
     if expected != got:
-        different = sorted(n for n in expected.keys() | got.keys() if expected.get(n) != got.get(n))
-        name = different[0]
+        name = min(n for n in expected.keys() | got.keys() if expected.get(n) != got.get(n))
         raise CheckpointError(
             f"Expected in {path} the weights of the network that its header describes; {name} should be of shape "
             f"{expected.get(name, 'absent')}, got {got.get(name, 'absent')}."
         )
     if not all(bool(torch.isfinite(tensor).all()) for tensor in tensors.values()):
         raise CheckpointError(f"Expected finite weights in {path}; some are not. Train again.")
-    network.load_state_dict({name: _cast(tensor, torch.float32) for name, tensor in tensors.items()}, assign=True)
+    network.load_state_dict(in_precision(tensors, torch.float32), assign=True)
     network.requires_grad_(False)
     return network.eval(), header
 
 
-def _cast(tensor: Tensor, dtype: torch.dtype) -> Tensor:
-    """In another precision; counters stay integers."""
-    return tensor.to(dtype) if tensor.is_floating_point() else tensor
+def in_precision(tensors: Mapping[str, Tensor], dtype: torch.dtype) -> dict[str, Tensor]:
+    """The same tensors in another precision; counters stay integers."""
+    return {name: tensor.to(dtype) if tensor.is_floating_point() else tensor for name, tensor in tensors.items()}

@@ -10,17 +10,13 @@ from dataclasses import replace
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from torch import Tensor
 
 from learned_priors.losses import cross_entropy, loss_of, targets_of
 from learned_priors.metrics import whole_order_accuracy
-from learned_priors.networks import Logits, NetworkConfig, OrderNetwork
+from learned_priors.networks import CHUNK, Logits, NetworkConfig, OrderNetwork
 from learned_priors.train_config import TrainConfig
 from neurosym.errors import InputError
 from neurosym.language.demonstrations import Demonstrations
-
-#: Pictures prepared, or read, at a time: bounds the memory that float copies of them take.
-CHUNK = 256
 
 #: Keeps the draws for dropout and Gumbel noise apart from other uses of the seed.
 _NOISE = 2
@@ -39,18 +35,17 @@ class Learner:
         total_updates: int,
     ) -> None:
         self.config, self.seed, self.device, self.total = config, seed, device, total_updates
-        with _seeded(seed, device):
+        with self._seeded(seed):
             self.network = OrderNetwork(network).to(device)
         kind = torch.optim.AdamW if config.optimizer == "adamw" else torch.optim.Adam
         self.optimizer = kind(self.network.parameters(), lr=config.rate, weight_decay=config.weight_decay, fused=True)
-        self.demonstrations = demonstrations
-        marginals = demonstrations.marginals if config.soft else None
-        self.target = targets_of(
-            torch.from_numpy(demonstrations.sequences),
-            len(demonstrations.actions),
-            None if marginals is None else torch.from_numpy(marginals),
-        ).to(device)
-        self.prepared = prepare(self.network, demonstrations.pictures, device)
+        self.sequences = demonstrations.sequences
+        self.marginals = demonstrations.marginals if config.soft else None
+        marginals = None if self.marginals is None else torch.from_numpy(self.marginals)
+        self.target = targets_of(torch.from_numpy(self.sequences), network.n_actions, marginals).to(device)
+        with torch.no_grad():
+            chunks = self.network.chunks(demonstrations.pictures)
+            self.prepared = torch.cat([self.network.prepare(chunk) for chunk in chunks])
 
     def update(self, index: NDArray[np.int64], done: int) -> float:
         """Update number `done` (from 0) on the demonstrations at `index`; their loss, weighted by their number."""
@@ -58,7 +53,7 @@ class Learner:
             group["lr"] = learning_rate(done, self.total, self.config)
         self.network.train()
         i = torch.from_numpy(index).to(self.device)
-        with _seeded(_seed_of(self.seed, _NOISE, done), self.device), self._autocast():
+        with self._noise(done):
             logits: Logits = self.network(self.prepared[i])
             loss = loss_of(logits.to(torch.float32), self.target[i], self.config)
         value = float(loss.detach())
@@ -74,32 +69,22 @@ class Learner:
     @torch.no_grad()
     def measure(self, index: NDArray[np.int64]) -> tuple[float, float]:
         """Held-out loss and share of whole orders right."""
-        self.network.eval()
         i = torch.from_numpy(index).to(self.device)
-        with _seeded(_seed_of(self.seed, _NOISE, 0), self.device), self._autocast():
-            logits = Logits.joined([self.network(self.prepared[part]) for part in torch.split(i, CHUNK)])
-            logits = logits.to(torch.float32)
+        with self._noise(0):
+            logits = self._logits(i).to(torch.float32)
             loss = float(loss_of(logits, self.target[i], self.config))
-        table = self.network.log_prob(logits).cpu().numpy()
-        length = self.network.log_length(logits)
-        demos = self.demonstrations
-        soft = demos.marginals[index] if self.config.soft and demos.marginals is not None else None
+        table, length = self.network.tables(logits)
+        marginals, classes = None if self.marginals is None else self.marginals[index], self.config.classes
         right = whole_order_accuracy(
-            table,
-            demos.sequences[index],
-            log_length=None if length is None else length.cpu().numpy(),
-            marginals=soft,
-            classes=self.config.classes,
+            table, self.sequences[index], log_length=length, marginals=marginals, classes=classes
         )
         return loss, right
 
     @torch.no_grad()
-    def calibrate(self, index: NDArray[np.int64]) -> float:
-        """Set the network's temperature to the one of the least cross-entropy on `index`; returns it."""
-        self.network.eval()
+    def calibrate(self, index: NDArray[np.int64]) -> None:
+        """Set the network's temperature to the one of the least cross-entropy on `index`."""
         i = torch.from_numpy(index).to(self.device)
-        logits = Logits.joined([self.network(self.prepared[part]) for part in torch.split(i, CHUNK)])
-        target, before = self.target[i].to(torch.float64), self.network.config
+        logits, target, before = self._logits(i), self.target[i].to(torch.float64), self.network.config
 
         def loss_at(temperature: float) -> float:
             self.network.config = replace(before, temperature=temperature)
@@ -107,20 +92,27 @@ class Learner:
 
         best = min((before.temperature * 2 ** (k / 4) for k in range(-8, 17)), key=loss_at)
         self.network.config = replace(before, temperature=best)
-        return best
 
-    def _autocast(self) -> torch.autocast:
-        return torch.autocast(self.device.type, torch.bfloat16, enabled=self.config.precision == "bfloat16")
+    def _logits(self, index: torch.Tensor) -> Logits:
+        """The network's answers as it reads, without dropout."""
+        self.network.eval()
+        return Logits.joined([self.network(self.prepared[part]) for part in torch.split(index, CHUNK)])
 
+    @contextmanager
+    def _noise(self, update: int) -> Iterator[None]:
+        """The draws of an update, whatever was drawn before it, in the precision asked for."""
+        enabled = self.config.precision == "bfloat16"
+        # A 63-bit seed, the same on every machine.
+        seed = np.random.SeedSequence((self.seed, _NOISE, update)).generate_state(1, np.uint64)[0] >> np.uint64(1)
+        with self._seeded(int(seed)), torch.autocast(self.device.type, torch.bfloat16, enabled=enabled):
+            yield
 
-def prepare(network: OrderNetwork, pictures: NDArray[np.uint8], device: torch.device) -> Tensor:
-    """The fixed work on pictures (M, V, H, W, 3), done once, chunk by chunk; first axis M."""
-    with torch.no_grad():
-        chunks = [
-            network.prepare(torch.from_numpy(np.ascontiguousarray(pictures[k : k + CHUNK])).to(device))
-            for k in range(0, len(pictures), CHUNK)
-        ]
-    return torch.cat(chunks)
+    @contextmanager
+    def _seeded(self, seed: int) -> Iterator[None]:
+        """torch's generators start from `seed` inside, and are as they were outside: no global seed is set."""
+        with torch.random.fork_rng(devices=[self.device] if self.device.type == "cuda" else []):
+            torch.manual_seed(seed)
+            yield
 
 
 def learning_rate(update: int, total: int, config: TrainConfig) -> float:
@@ -133,17 +125,3 @@ def learning_rate(update: int, total: int, config: TrainConfig) -> float:
     else:
         low, high, share = config.rate, 0.0, (update - warm) / max(total - warm, 1)
     return low + (high - low) * 0.5 * (1 - math.cos(math.pi * share))
-
-
-def _seed_of(*numbers: int) -> int:
-    """A 63-bit seed from several numbers, the same on every machine."""
-    return int(np.random.SeedSequence(numbers).generate_state(1, np.uint64)[0] >> np.uint64(1))
-
-
-@contextmanager
-def _seeded(seed: int, device: torch.device) -> Iterator[None]:
-    """torch's generators start from `seed` inside, and are as they were outside: no global seed is set."""
-    devices = [device] if device.type == "cuda" else []
-    with torch.random.fork_rng(devices=devices):
-        torch.manual_seed(seed)
-        yield

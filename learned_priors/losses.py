@@ -65,7 +65,7 @@ def squared_error(log_samples: Tensor, target: Tensor) -> Tensor:
 def loss_of(logits: Logits, target: Tensor, config: TrainConfig) -> Tensor:
     """The training loss of logits against targets (B, T, N), a scalar.
 
-    Where the network says how many steps there are, that is learned by cross-entropy beside the order, which is
+    Where the network answers with a number of steps, that is learned by cross-entropy beside the order, which is
     learned on the steps taken; where stopping is an action, it is the right one at every step not taken.
     """
     if logits.stop is not None:
@@ -81,17 +81,14 @@ def loss_of(logits: Logits, target: Tensor, config: TrainConfig) -> Tensor:
 
 
 def _order_loss(order: Tensor, target: Tensor, config: TrainConfig) -> Tensor:
+    temperature, iterations = config.temperature, config.iterations
     if config.loss == "gumbel-sinkhorn":
         samples = gumbel_sinkhorn(
-            order,
-            samples=config.samples,
-            temperature=config.temperature,
-            noise=config.noise,
-            iterations=config.iterations,
+            order, samples=config.samples, temperature=temperature, noise=config.noise, iterations=iterations
         )
         return squared_error(samples, target)
     if config.loss == "sinkhorn":
-        log_prob = log_sinkhorn(order / config.temperature, tolerance=None, max_iterations=config.iterations)
+        log_prob = log_sinkhorn(order / temperature, tolerance=None, max_iterations=iterations)
     else:
         log_prob = torch.log_softmax(order, dim=-1)
     return cross_entropy(log_prob, target, config.classes)

@@ -10,10 +10,10 @@ from scipy.optimize import linear_sum_assignment
 
 from neurosym.planning.order_scores import OrderScores
 
+Orders = NDArray[np.int64]
 
-def decoded(
-    log_prob: ArrayLike, classes: Sequence[int] = (), *, log_length: ArrayLike | None = None
-) -> NDArray[np.int64]:
+
+def decoded(log_prob: ArrayLike, classes: Sequence[int] = (), *, log_length: ArrayLike | None = None) -> Orders:
     """The likeliest orders, by the Hungarian algorithm: no action twice.
 
     With unsure lengths, the likeliest number of steps is taken first, then the best assignment to these steps (the
@@ -36,33 +36,17 @@ def decoded(
     return orders
 
 
-def step_matches(
-    orders: NDArray[np.int64], sequences: NDArray[np.int64], classes: Sequence[int] = ()
-) -> NDArray[np.bool_]:
+def step_matches(orders: Orders, sequences: Orders, classes: Sequence[int] = ()) -> NDArray[np.bool_]:
     """bool (M, T): the step names an action of the demonstrated one's class, or is not taken. Both int64 (M, T)."""
-    taken = sequences >= 0
     label = np.asarray(classes) if classes else np.arange(max(int(orders.max()), int(sequences.max())) + 1)
     same = label[np.maximum(orders, 0)] == label[np.maximum(sequences, 0)]
-    matches: NDArray[np.bool_] = (same & (orders >= 0)) | ~taken
+    matches: NDArray[np.bool_] = (same & (orders >= 0)) | (sequences < 0)
     return matches
-
-
-def stop_matches(orders: NDArray[np.int64], sequences: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """bool (M,): the order has as many steps as the demonstration. Both int64 (M, T), -1 after the last step."""
-    same: NDArray[np.bool_] = (orders >= 0).sum(axis=1) == (sequences >= 0).sum(axis=1)
-    return same
-
-
-def re_used(orders: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """bool (M,): the order names some action twice (in the paper's towers: it demolishes what stands)."""
-    ordered = np.sort(orders, axis=1)
-    twice: NDArray[np.bool_] = ((ordered[:, 1:] == ordered[:, :-1]) & (ordered[:, 1:] >= 0)).any(axis=1)
-    return twice
 
 
 def whole_order_accuracy(
     log_prob: ArrayLike,
-    sequences: NDArray[np.int64],
+    sequences: Orders,
     *,
     log_length: ArrayLike | None = None,
     marginals: NDArray[np.float32] | None = None,
@@ -72,33 +56,26 @@ def whole_order_accuracy(
 
     Against marginals, where many orders are right: the share whose every step is one that some valid order has. That
     is necessary for a valid order, not sufficient. With unsure lengths, the length is to be right, too.
+
+    Shapes: log_prob (M, T, N); sequences int64 (M, T), -1 where a step is not taken; the others as for `decoded`.
     """
     orders = decoded(log_prob, classes, log_length=log_length)
-    ended = stop_matches(orders, sequences) if log_length is not None else np.ones(len(orders), dtype=np.bool_)
     if marginals is None:
-        return float((step_matches(orders, sequences, classes).all(axis=1) & ended).mean())
-    possible = np.take_along_axis(marginals, np.maximum(orders, 0)[..., None], axis=2)[..., 0] > 0
-    return float(((possible | (sequences < 0)).all(axis=1) & ended).mean())
+        matches = step_matches(orders, sequences, classes)
+    else:
+        share = np.take_along_axis(marginals, np.maximum(orders, 0)[..., None], axis=2)[..., 0]
+        matches = (share > 0) | (sequences < 0)
+    right = matches.all(axis=1)
+    if log_length is not None:
+        right &= (orders >= 0).sum(axis=1) == (sequences >= 0).sum(axis=1)
+    return float(right.mean())
 
 
-def per_step_accuracy(log_prob: ArrayLike, sequences: NDArray[np.int64], *, classes: Sequence[int] = ()) -> float:
-    """Share of demonstrated steps whose decoded action is of the right class."""
-    taken = sequences >= 0
-    matches = step_matches(decoded(log_prob, classes), sequences, classes)
-    return float(matches[taken].mean()) if taken.any() else 1.0
-
-
-def calibration_error(
-    log_prob: ArrayLike, sequences: NDArray[np.int64], *, classes: Sequence[int] = (), bins: int = 10
-) -> float:
+def calibration_error(log_prob: ArrayLike, sequences: Orders, *, classes: Sequence[int] = (), bins: int = 10) -> float:
     """Expected calibration error (Guo et al., ICML 2017, eq. 3) of each step's likeliest class of actions.
 
     The steps taken are sorted by their confidence into bins of equal width; it is the mean difference, weighted by
-    the number of steps, of confidence and share of steps right. 0 is perfect.
-
-    Args:
-        log_prob: (M, T, N).
-        sequences: int64 (M, T), what was demonstrated; -1 where a step is not taken.
+    the number of steps, of confidence and share of steps right. 0 is perfect. Shapes as for `whole_order_accuracy`.
     """
     tables = np.asarray(log_prob, dtype=np.float64)
     chance = np.stack([np.exp(-OrderScores(table, classes=tuple(classes)).costs) for table in tables])
@@ -106,6 +83,5 @@ def calibration_error(
     taken = sequences >= 0
     sure, right = chance.max(axis=2)[taken], matches[taken]
     place = np.minimum((sure * bins).astype(int), bins - 1)
-    total = np.bincount(place, minlength=bins)
     gaps = np.abs(np.bincount(place, sure, bins) - np.bincount(place, right, bins))
-    return float(gaps.sum() / max(int(total.sum()), 1))
+    return float(gaps.sum() / max(len(place), 1))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self, overload
@@ -12,13 +12,11 @@ import torch
 from numpy.typing import ArrayLike, NDArray
 
 from learned_priors.checkpoints import save_network
-from learned_priors.learner import CHUNK
-from learned_priors.metrics import decoded
-from learned_priors.networks import Logits
 from learned_priors.recipes import Recipe, recipe_named
 from learned_priors.train_config import TrainConfig
+from learned_priors.trained_network import TrainedNetwork
 from learned_priors.training import FitProgress, fit
-from learned_priors.weight_store import Weights, WeightStore
+from learned_priors.weight_store import WeightStore
 from neurosym.errors import InputError
 from neurosym.language.demonstrations import Demonstrations
 from neurosym.planning.order_scores import OrderScores
@@ -84,18 +82,14 @@ class NetworkPrior(Prior):
     @overload
     def read(self, pictures: ArrayLike) -> OrderScores | list[OrderScores]: ...
     def read(self, pictures: ArrayLike) -> OrderScores | list[OrderScores]:
-        """Order scores from pictures alone.
-
-        Args:
-            pictures: uint8 (V, H, W, 3) of one piece of work, or a batch (M, V, H, W, 3).
+        """Order scores from pictures alone, uint8 (V, H, W, 3) of one piece of work, or a batch (M, V, H, W, 3).
 
         Returns:
             One `OrderScores` for one set of pictures, a list of M for a batch; columns named as in the training.
         """
         batch, single = as_picture_batch(pictures)
-        weights = self._weights.for_pictures(batch.shape[1:])
-        found = self._read(weights, batch)
-        return found[0] if single else found
+        scores = self._weights.for_pictures(batch.shape[1:]).scores(batch)
+        return scores[0] if single else scores
 
     def predict(self, pictures: ArrayLike) -> NDArray[np.int64]:
         """The model's own order, as the paper compares it; unlike one of `OrderScores`, it may be wrong by itself.
@@ -104,25 +98,14 @@ class NetworkPrior(Prior):
         others take the likeliest number of steps, if that is unsure, and the best assignment of actions to them;
         the full recipes sum the probabilities of interchangeable actions first.
 
-        Args:
-            pictures: uint8 (V, H, W, 3) of one piece of work, or a batch (M, V, H, W, 3).
-
         Returns:
             int64 (M, T) for a batch, (T,) for one: indices into the actions of the training; -1 after the last step.
+            Pictures as for `read`.
         """
         batch, single = as_picture_batch(pictures)
-        weights = self._weights.for_pictures(batch.shape[1:])
-        config = weights.network.config
-        classes = weights.classes if self.recipe.train.sum_classes else ()
-        found = [np.empty((0, config.n_steps), dtype=np.int64)]
-        for logits in self._logits(weights, batch):
-            if self.recipe.predicts == "independent":
-                found.append(_likeliest_by_step(logits))
-                continue
-            length = weights.network.log_length(logits)
-            table = weights.network.log_prob(logits).cpu().numpy()
-            found.append(decoded(table, classes, log_length=None if length is None else length.cpu().numpy()))
-        orders = np.concatenate(found)
+        trained = self._weights.for_pictures(batch.shape[1:])
+        assigned, sum_classes = self.recipe.predicts == "assignment", self.recipe.train.sum_classes
+        orders = trained.orders(batch, assigned=assigned, sum_classes=sum_classes)
         return orders[0] if single else orders
 
     def scores(self, problems: Sequence[Problem]) -> list[OrderScores]:
@@ -133,24 +116,23 @@ class NetworkPrior(Prior):
         Raises:
             InputError: a problem has no pictures, pictures of another shape, or actions that the network does not know.
         """
-        groups: dict[Weights, list[int]] = {}
+        groups: dict[TrainedNetwork, list[int]] = {}
         pictures: list[NDArray[np.uint8]] = []
         for k, problem in enumerate(problems):
-            observation = problem.observation
-            if observation is None:
+            if problem.observation is None:
                 raise InputError(
                     f"Expected pictures of the problem {problem.name!r}, from which this prior reads; it has none. "
                     "Give it some (problem.with_pictures), or plan with prior=None."
                 )
-            weights = self._weights.for_problem(problem)
-            pictures.append(weights.checked(np.asarray(observation)))
-            groups.setdefault(weights, []).append(k)
-        found: dict[int, OrderScores] = {}
-        for weights, index in groups.items():
-            for k, scores in zip(index, self._read(weights, np.stack([pictures[k] for k in index]))):
+            trained = self._weights.for_problem(problem)
+            pictures.append(trained.checked(np.asarray(problem.observation)))
+            groups.setdefault(trained, []).append(k)
+        answers: dict[int, OrderScores] = {}
+        for trained, index in groups.items():
+            for k, scores in zip(index, trained.scores(np.stack([pictures[k] for k in index]))):
                 left = scores.restricted(problems[k].actions)
-                found[k] = OrderScores(left.log_prob, left.actions, left.log_length, tuple(problems[k].classes))
-        return [found[k] for k in range(len(problems))]
+                answers[k] = OrderScores(left.log_prob, left.actions, left.log_length, tuple(problems[k].classes))
+        return [answers[k] for k in range(len(problems))]
 
     def fit(
         self,
@@ -179,28 +161,29 @@ class NetworkPrior(Prior):
         """
         if device is not None:
             self.device = self._weights.device = _checked_device(device)
-        network, train = self.recipe.configured(
+        given, train = self.recipe.configured(
             demonstrations, encoder=self.encoder or "small", epochs=epochs, config=config, settings=settings
         )
-        fitted = fit(
+        kept = Path(checkpoint) if checkpoint else None
+        network, figures = fit(
             demonstrations,
-            network,
+            given,
             train,
             seed=seed,
-            device=str(self.device),
+            device=self.device,
             progress=progress,
-            checkpoint=Path(checkpoint) if checkpoint else None,
+            checkpoint=kept,
             resume=resume,
         )
-        header: dict[str, Any] = {
+        header = {
             "prior": self.recipe.name,
             "domain": demonstrations.domain,
             "actions": list(demonstrations.actions),
-            "training": fitted.figures,
+            "network": network.config.to_json(),
+            "training": figures,
         }
-        if demonstrations.classes:
-            header["classes"] = list(demonstrations.classes)
-        self._weights.own = Weights(fitted.network, header)
+        classes = {"classes": list(demonstrations.classes)} if demonstrations.classes else {}
+        self._weights.own = TrainedNetwork(network, {**header, **classes})
         return self
 
     def save(self, path: str | Path, *, notes: Mapping[str, Any] | None = None) -> Path:
@@ -215,40 +198,6 @@ class NetworkPrior(Prior):
         header = {**own.header, "demonstrations": dict(notes)} if notes else own.header
         save_network(Path(path), own.network, header)
         return Path(path)
-
-    def _read(self, weights: Weights, batch: NDArray[np.uint8]) -> list[OrderScores]:
-        network, actions, classes = weights.network, tuple(weights.header["actions"]), weights.classes
-        found: list[OrderScores] = []
-        for logits in self._logits(weights, batch):
-            tables = network.log_prob(logits).cpu().numpy()
-            length = network.log_length(logits)
-            lengths = [None] * len(tables) if length is None else length.cpu().numpy()
-            found += [OrderScores(table, actions, n, classes) for table, n in zip(tables, lengths)]
-        return found
-
-    def _logits(self, weights: Weights, batch: NDArray[np.uint8]) -> Iterator[Logits]:
-        """What the network says of the pictures, chunk by chunk."""
-        if len(batch):
-            weights.checked(batch[0])
-        for start in range(0, len(batch), CHUNK):
-            with torch.inference_mode():
-                pictures = torch.from_numpy(np.ascontiguousarray(batch[start : start + CHUNK])).to(self.device)
-                logits: Logits = weights.network(weights.network.prepare(pictures))
-            yield logits
-
-
-def _likeliest_by_step(logits: Logits) -> NDArray[np.int64]:
-    """Each step by itself: int64 (B, T), -1 from the first step on whose likeliest choice is to stop."""
-    steps, actions = logits.order.shape[1:]
-    if logits.length is not None:
-        ended = torch.arange(steps, device=logits.order.device) >= logits.length.argmax(dim=-1, keepdim=True)
-        choice = logits.order.argmax(dim=-1)
-    else:
-        stop = [] if logits.stop is None else [logits.stop[..., None]]
-        choice = torch.cat([logits.order, *stop], dim=-1).argmax(dim=-1)
-        ended = (choice == actions).cumsum(dim=-1) > 0
-    order: NDArray[np.int64] = choice.masked_fill(ended, -1).cpu().numpy()
-    return order
 
 
 def _checked_device(name: str) -> torch.device:

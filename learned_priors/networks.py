@@ -1,20 +1,20 @@
 """The networks that order actions: an encoder of pictures, a head that gives logits for each step and action, and,
-where tasks differ in length, something that tells how many steps there are."""
+where tasks differ in length, something that tells the number of steps."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, Literal, NamedTuple, get_args
 
+import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from learned_priors.encoders import PictureShape, build_encoder
-from learned_priors.glimpses import GlimpseHead
+from learned_priors.heads import GlimpseHead, StoppingNetwork, TemporalDecoder, log_length_of_stops
 from learned_priors.sinkhorn import TOLERANCE, log_sinkhorn, scaled_sinkhorn
-from learned_priors.stopping import StoppingNetwork, log_length_of_stops
-from learned_priors.temporal import TemporalDecoder
 from neurosym.errors import CheckpointError
 
 Head = Literal["dense", "tcn", "glimpses"]
@@ -24,15 +24,18 @@ Stop = Literal["none", "head", "network", "class"]
 #: Column updates when reading: after so many, columns of near ties are off by about 1e-3 (see `MAX_ITERATIONS`).
 READ_ITERATIONS = 1_000
 
+#: Pictures prepared, or read, at a time: bounds the memory that float copies of them take.
+CHUNK = 256
+
 
 @dataclass(frozen=True)
 class NetworkConfig:
-    """Everything that decides a network's shape and how it is read; it travels in the header of a weights file.
+    """Everything that decides a network's shape and reading; it travels in the header of a weights file.
 
     Attributes:
         encoder: a name that `build_encoder` knows.
         head: "dense" (a perceptron), "tcn" (temporal convolutions) or "glimpses" (looks at one place a step).
-        decoding: how logits become log-probabilities: "sinkhorn", or "rows" (a softmax a step).
+        decoding: what turns logits into log-probabilities: "sinkhorn", or "rows" (a softmax a step).
         picture_shape: (V, H, W, 3).
         n_steps, n_actions: T and N; T < N makes a rectangular head.
         width: neurons in the hidden layer of the dense head or of the glimpses' reading, or latent dimensions a step of
@@ -84,11 +87,11 @@ class NetworkConfig:
 
 
 class Logits(NamedTuple):
-    """What a network says of B pictures.
+    """What a network answers to B pictures.
 
     Attributes:
         order: (B, T, N), X = g_theta(I): how well action j suits step i.
-        length: (B, T + 1), how likely 0 .. T steps are; None unless a stopping head or network says so.
+        length: (B, T + 1), how likely 0 .. T steps are; None unless a stopping head or network answers it.
         stop: (B, T), how well stopping suits step i, on the scale of `order`; None unless stopping is an action.
     """
 
@@ -115,21 +118,16 @@ class OrderNetwork(nn.Module):
         super().__init__()
         self.config = config
         self.encoder = build_encoder(config.encoder, config.picture_shape)
-        features, steps, actions = self.encoder.out_features, config.n_steps, config.n_actions
-        columns = actions + (config.stop == "class")
-        self.looks = config.head == "glimpses"
+        features, steps, width = self.encoder.out_features, config.n_steps, config.width
+        columns = config.n_actions + (config.stop == "class")
         self.head: nn.Module
         if config.head == "tcn":
-            self.head = TemporalDecoder(features, steps, columns, width=config.width)
+            self.head = TemporalDecoder(features, steps, columns, width=width)
         elif config.head == "glimpses":
-            self.head = GlimpseHead(features, self.encoder.places_shape, steps, columns, width=config.width)
+            self.head = GlimpseHead(features, self.encoder.places_shape, steps, columns, width=width)
         else:
-            self.head = nn.Sequential(
-                nn.Linear(features, config.width),
-                nn.ReLU(),
-                nn.Linear(config.width, steps * columns),
-                nn.Unflatten(1, (steps, columns)),
-            )
+            layers = nn.Linear(features, width), nn.ReLU(), nn.Linear(width, steps * columns)
+            self.head = nn.Sequential(*layers, nn.Unflatten(1, (steps, columns)))
         if config.stop == "head":
             self.length = nn.Linear(features, steps + 1)
         elif config.stop == "network":
@@ -139,10 +137,17 @@ class OrderNetwork(nn.Module):
         """uint8 (B, V, H, W, 3) -> what `forward` takes; done once for pictures that are seen many times."""
         return self.encoder.prepare(pictures)
 
+    def chunks(self, pictures: NDArray[np.uint8]) -> Iterator[Tensor]:
+        """Any number of pictures as `prepare` takes them, a chunk at a time, on this network's device."""
+        device = next(self.parameters()).device
+        for start in range(0, len(pictures), CHUNK):
+            yield torch.from_numpy(np.ascontiguousarray(pictures[start : start + CHUNK])).to(device)
+
     def forward(self, prepared: Tensor) -> Logits:
         """What `prepare` gave -> logits."""
         features = self.encoder(prepared)
-        table = self.head(features, self.encoder.places(prepared)) if self.looks else self.head(features)
+        places = (self.encoder.places(prepared),) if self.config.head == "glimpses" else ()
+        table = self.head(features, *places)
         if self.config.stop == "class":
             return Logits(table[..., :-1], stop=table[..., -1])
         if self.config.stop == "head":
@@ -157,16 +162,13 @@ class OrderNetwork(nn.Module):
         Rows of exp() sum to one, columns to at most one (Sinkhorn). In float64, where sums are exact enough that a
         picture read alone or in a batch stops at the same iteration.
         """
-        exact, some = logits.order.to(torch.float64) / self.config.temperature, self.config.iterations
+        exact, iterations = logits.order.to(torch.float64) / self.config.temperature, self.config.iterations
         if self.config.decoding == "rows":
             return torch.log_softmax(exact, dim=-1)
+        tolerance, most = (TOLERANCE, READ_ITERATIONS) if iterations is None else (None, iterations)
         if exact.device.type == "cpu":
-            table = exact.detach().numpy()
-            if some is not None:
-                return torch.from_numpy(scaled_sinkhorn(table, tolerance=None, max_iterations=some))
-            return torch.from_numpy(scaled_sinkhorn(table, tolerance=TOLERANCE, max_iterations=READ_ITERATIONS))
-        tolerance = TOLERANCE if some is None else None
-        return log_sinkhorn(exact, tolerance=tolerance, max_iterations=READ_ITERATIONS if some is None else some)
+            return torch.from_numpy(scaled_sinkhorn(exact.detach().numpy(), tolerance=tolerance, max_iterations=most))
+        return log_sinkhorn(exact, tolerance=tolerance, max_iterations=most)
 
     def log_length(self, logits: Logits) -> Tensor | None:
         """Log-probabilities that the task takes 0 .. T steps, (B, T + 1), float64; None where it always takes T."""
@@ -174,3 +176,8 @@ class OrderNetwork(nn.Module):
         if exact.stop is not None:
             return log_length_of_stops(exact.order, exact.stop)
         return None if exact.length is None else torch.log_softmax(exact.length, dim=-1)
+
+    def tables(self, logits: Logits) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
+        """`log_prob` and `log_length` as arrays."""
+        length = self.log_length(logits)
+        return self.log_prob(logits).cpu().numpy(), None if length is None else length.cpu().numpy()

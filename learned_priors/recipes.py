@@ -1,4 +1,4 @@
-"""What each named prior is made of: the network's head, and how it is trained."""
+"""What each named prior is made of: the network's head, and its training."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ class Variant:
 
 @dataclass(frozen=True)
 class Recipe:
-    """A named prior: its network, how it is trained, and how `NetworkPrior.predict` reads an order from it.
+    """A named prior: its network, its training, and what `NetworkPrior.predict` makes of it.
 
     Attributes:
         name: as the entry point's.
         head, width, decoding: of the network, see `NetworkConfig`.
-        train: how it is trained.
+        train: the settings of its training.
         stop: what tells the number of steps, where demonstrations differ in it; see `NetworkConfig`.
         predicts: "assignment" (the Hungarian algorithm; no action twice) or "independent" (the likeliest of each
             step, which may be the same twice).
@@ -48,13 +48,6 @@ class Recipe:
     some_actions: Variant | None = None
     one_view: Variant | None = None
 
-    def variant(self, *, all_actions: bool, one_view: bool) -> Variant:
-        """What is trained, by whether tasks take all of the actions, and are shown in one square view."""
-        found = self.one_view if one_view else None
-        if found is None and not all_actions:
-            found = self.some_actions
-        return found or Variant(self.head, self.width)
-
     def configured(
         self,
         demonstrations: Demonstrations,
@@ -64,12 +57,13 @@ class Recipe:
         config: TrainConfig | None = None,
         settings: Mapping[str, Any] | None = None,
     ) -> tuple[NetworkConfig, TrainConfig]:
-        """The network, and how it is trained, for these demonstrations; see `NetworkPrior.fit`."""
+        """The network and the training for these demonstrations; see `NetworkPrior.fit`."""
         views, height, width, colours = demonstrations.pictures.shape[1:]
         n_steps, n_actions = demonstrations.sequences.shape[1], len(demonstrations.actions)
         shortest = int(demonstrations.lengths.min())
-        one_view = views == 1 and max(height, width) < 2 * min(height, width)
-        variant = self.variant(all_actions=shortest == n_actions, one_view=one_view)
+        one_view = self.one_view if views == 1 and max(height, width) < 2 * min(height, width) else None
+        some_actions = self.some_actions if shortest < n_actions else None
+        variant = one_view or some_actions or Variant(self.head, self.width)
         train = (config or self.train.changed(variant.settings)).changed(settings or {})
         if epochs is not None:
             if epochs < 1:
@@ -94,50 +88,34 @@ class Recipe:
             object.__setattr__(self, "trained_as", self.name)
 
 
+# The paper trains for thousands of epochs; on pictures of Soma, 300 were no better than 150.
+_PAPER = TrainConfig(
+    loss="rows", soft=False, epochs=150, optimizer="adam", rate=3e-4, schedule="constant", batch=32, weight_decay=0.0
+)
 # The full recipes hold nothing out: on 120 Soma cubes, a tenth kept back to choose the best epoch raised the failures
 # on unseen cubes, in all 48 poses, from 0.9% to 1.2%.
-# The paper trains for thousands of epochs; on pictures of Soma, 300 were no better than 150.
-_PAPER: dict[str, Any] = {
-    "soft": False,
-    "epochs": 150,
-    "optimizer": "adam",
-    "rate": 3e-4,
-    "schedule": "constant",
-    "batch": 32,
-    "weight_decay": 0.0,
-}
+_FULL = TrainConfig(loss="sinkhorn", soft=True, sum_classes=True, calibrate=True, epochs=80, least_steps=1500)
+
 # A temporal head names actions by one layer that all steps share. At 6 steps of 98 tiles, 3,000 pictures and 800
 # updates, that reads 96% of letters, the dense head 75%. Where all actions are used, it is no better. 10,000 pictures
 # and 2,200 updates of twice the rate read 99.6% (batches of 64; with 32 or 128, 98.5%).
+_SOME_ACTIONS = Variant("tcn", 32, {"batch": 64, "rate": 4e-3, "most_steps": 2200})
 # Towers are seen in one square view, where each step is at one place: of hard ones of 2 to 6 blocks, 400 demonstrations
 # teach a head of glimpses 99% of whole sequences, the temporal one 77%. It wants many small updates.
-_FULL: dict[str, Any] = {"soft": True, "sum_classes": True, "calibrate": True, "epochs": 80, "least_steps": 1500}
+_ONE_VIEW = Variant("glimpses", 64, {"batch": 32, "least_steps": 2000, "most_steps": 3300})
 
-_BC = Recipe("bc", "dense", 128, "rows", TrainConfig(loss="rows", **_PAPER), "class", "independent")
-_TCN = Recipe("tcn-paper", "tcn", 16, "rows", TrainConfig(loss="rows", **_PAPER), "class", "independent")
-
-RECIPES = {
-    recipe.name: recipe
-    for recipe in (
-        Recipe(
-            "sinkhorn",
-            "dense",
-            128,
-            "sinkhorn",
-            TrainConfig(loss="sinkhorn", **_FULL),
-            some_actions=Variant("tcn", 32, {"batch": 64, "rate": 4e-3, "most_steps": 2200}),
-            one_view=Variant("glimpses", 64, {"batch": 32, "least_steps": 2000, "most_steps": 3300}),
-        ),
-        Recipe("tcn", "tcn", 32, "rows", TrainConfig(loss="rows", **_FULL)),
-        Recipe(
-            "sinkhorn-paper", "dense", 128, "sinkhorn", TrainConfig(loss="gumbel-sinkhorn", **_PAPER), stop="network"
-        ),
-        _BC,
-        replace(_BC, name="bc+hungarian", predicts="assignment"),
-        _TCN,
-        replace(_TCN, name="tcn-paper+hungarian", predicts="assignment"),
-    )
-}
+_BC = Recipe("bc", "dense", 128, "rows", _PAPER, "class", "independent")
+_TCN = Recipe("tcn-paper", "tcn", 16, "rows", _PAPER, "class", "independent")
+_ALL = (
+    Recipe("sinkhorn", "dense", 128, "sinkhorn", _FULL, some_actions=_SOME_ACTIONS, one_view=_ONE_VIEW),
+    Recipe("tcn", "tcn", 32, "rows", replace(_FULL, loss="rows")),
+    Recipe("sinkhorn-paper", "dense", 128, "sinkhorn", replace(_PAPER, loss="gumbel-sinkhorn"), stop="network"),
+    _BC,
+    replace(_BC, name="bc+hungarian", predicts="assignment"),
+    _TCN,
+    replace(_TCN, name="tcn-paper+hungarian", predicts="assignment"),
+)
+RECIPES = {recipe.name: recipe for recipe in _ALL}
 
 
 def recipe_named(name: str) -> Recipe:

@@ -24,7 +24,7 @@ _KIND = "training-state"
 
 @dataclass
 class RunState:
-    """Where a run is: `step` updates into epoch number `epoch` (from 0), and what it has seen."""
+    """Where a run is: `step` updates into epoch number `epoch` (from 0), and its figures so far."""
 
     epoch: int = 0
     step: int = 0
@@ -34,7 +34,7 @@ class RunState:
     best_loss: float = math.inf
     best_epoch: int = 0
     stopped: bool = False
-    figures: dict[str, float | None] = field(default_factory=dict)
+    figures: dict[str, Any] = field(default_factory=dict)
     best: dict[str, Tensor] = field(default_factory=dict)
 
 
@@ -63,10 +63,7 @@ def save_state(path: Path, mark: str, state: RunState, network: OrderNetwork, op
 
 
 def load_state(path: Path, mark: str, network: OrderNetwork, optimizer: torch.optim.Optimizer) -> RunState:
-    """Put the state at `path` into the network and the optimiser, and give the rest.
-
-    Raises `CheckpointError` if it is damaged or of another run.
-    """
+    """Load network and optimiser from `path`, and give the rest; `CheckpointError` if damaged or of another run."""
     tensors, header = read_tensors(path)
     if header.get("kind") != _KIND or header.get("fingerprint") != mark:
         raise CheckpointError(
@@ -75,17 +72,15 @@ def load_state(path: Path, mark: str, network: OrderNetwork, optimizer: torch.op
         )
     given = header["state"]
     state = RunState(**{**given, "best_loss": math.inf if given["best_loss"] is None else given["best_loss"]})
+
+    def part(prefix: str) -> dict[str, Tensor]:
+        return {name.removeprefix(prefix): tensor for name, tensor in tensors.items() if name.startswith(prefix)}
+
+    state.best = part("best.")
+    network.load_state_dict(part("model."))
     slots: dict[int, dict[str, Tensor]] = {}
-    weights: dict[str, Tensor] = {}
-    for name, tensor in tensors.items():
-        part, _, rest = name.partition(".")
-        if part == "model":
-            weights[rest] = tensor
-        elif part == "best":
-            state.best[rest] = tensor
-        else:
-            i, _, key = rest.partition(".")
-            slots.setdefault(int(i), {})[key] = tensor
-    network.load_state_dict(weights)
+    for name, tensor in part("optimizer.").items():
+        i, _, key = name.partition(".")
+        slots.setdefault(int(i), {})[key] = tensor
     optimizer.load_state_dict({"state": slots, "param_groups": optimizer.state_dict()["param_groups"]})
     return state

@@ -8,8 +8,7 @@ def torch_works() -> str:
     import torch
 
     # A generator of our own: no global seed is touched.
-    generator = torch.Generator().manual_seed(0)
-    inputs = torch.randn(64, 3, generator=generator)
+    inputs = torch.randn(64, 3, generator=torch.Generator().manual_seed(0))
     truth = torch.tensor([1.0, -2.0, 0.5])
     weights = torch.zeros(3, requires_grad=True)
     optimizer = torch.optim.AdamW([weights], lr=0.1, weight_decay=0.0)
@@ -21,5 +20,5 @@ def torch_works() -> str:
     off = float((weights.detach() - truth).abs().max())
     if not off < 1e-2:
         raise RuntimeError(f"gradient descent missed a known answer by {off:g}")
-    cuda = f"{torch.cuda.get_device_name(0)}" if torch.cuda.is_available() else "no CUDA device"
+    cuda = torch.cuda.get_device_name(0) if torch.cuda.is_available() else "no CUDA device"
     return f"gradients reach a known answer; {torch.get_num_threads()} threads, {cuda}"

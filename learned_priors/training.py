@@ -11,7 +11,7 @@ import math
 import time
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from learned_priors.checkpoints import in_precision
 from learned_priors.learner import Learner
 from learned_priors.networks import NetworkConfig, OrderNetwork
 from learned_priors.resume import RunState, fingerprint, load_state, save_state
@@ -42,25 +43,17 @@ class FitProgress:
     seconds: float
 
 
-@dataclass
-class Fitted:
-    """A trained network, and what its header will say of the training."""
-
-    network: OrderNetwork
-    figures: dict[str, Any] = field(default_factory=dict)
-
-
 def fit(
     demonstrations: Demonstrations,
     network: NetworkConfig,
     config: TrainConfig,
     *,
     seed: int = 0,
-    device: str = "cpu",
+    device: str | torch.device = "cpu",
     progress: Callable[[FitProgress], None] | None = None,
     checkpoint: Path | None = None,
     resume: bool = True,
-) -> Fitted:
+) -> tuple[OrderNetwork, dict[str, Any]]:
     """Train a network on demonstrations.
 
     Args:
@@ -71,13 +64,13 @@ def fit(
             raises `CheckpointError`.
 
     Returns:
-        The network, its weights rounded to float16 values, and figures.
+        The network, its weights rounded to float16 values, and what its header will say of the training.
     """
     if config.sum_classes and not config.classes:
         config = replace(config, classes=demonstrations.classes)
-    soft = demonstrations.marginals if config.soft else None
+    soft = config.soft and demonstrations.marginals is not None
     # Where actions are interchangeable, summing them stands in for the other orders.
-    if config.soft and soft is None and not config.classes:
+    if config.soft and not soft and not config.classes:
         warnings.warn(
             "These demonstrations have no marginals (shares of valid orders): learning from the sequences alone.",
             UserWarning,
@@ -99,50 +92,59 @@ def fit(
 
     started = time.monotonic() - state.seconds
     written = time.monotonic()
+
+    def keep(*, always: bool = False) -> None:
+        nonlocal written
+        state.seconds = time.monotonic() - started
+        if checkpoint and (always or time.monotonic() - written >= config.checkpoint_seconds):
+            save_state(checkpoint, mark, state, run.network, run.optimizer)
+            written = time.monotonic()
+
     while state.epoch < epochs and not state.stopped:
         order = learn[np.random.default_rng([seed, _ORDER, state.epoch]).permutation(len(learn))]
         for step in range(state.step, steps_per_epoch):
             state.loss_sum += run.update(order[step * config.batch : (step + 1) * config.batch], state.updates)
             state.step, state.updates = step + 1, state.updates + 1
-            if checkpoint and state.step < steps_per_epoch and time.monotonic() - written >= config.checkpoint_seconds:
-                state.seconds = time.monotonic() - started
-                save_state(checkpoint, mark, state, run.network, run.optimizer)
-                written = time.monotonic()
-        figures = _finish_epoch(run, state, held)
-        state.seconds = time.monotonic() - started
-        done = state.epoch == epochs or state.stopped
-        if checkpoint and (done or time.monotonic() - written >= config.checkpoint_seconds):
-            save_state(checkpoint, mark, state, run.network, run.optimizer)
-            written = time.monotonic()
+            if state.step < steps_per_epoch:
+                keep()
+        _finish_epoch(run, state, len(learn), held)
+        keep(always=state.epoch == epochs or state.stopped)
         if progress:
-            progress(FitProgress(state.epoch, epochs, *figures, state.seconds))
+            progress(FitProgress(epoch=state.epoch, epochs=epochs, seconds=state.seconds, **state.figures))
 
-    trained = run.network
     if config.keep == "best" and state.best:
-        trained.load_state_dict(state.best)
-    _round_to_half(trained)
+        run.network.load_state_dict(state.best)
+    # Files hold float16: the network in memory and the one read back are the same.
+    run.network.load_state_dict(in_precision(run.network.state_dict(), torch.float16))
     if config.calibrate and len(held):
         run.calibrate(held)
-    return Fitted(trained.eval().requires_grad_(False), _header_figures(state, config, seed, epochs, learn, held, soft))
+    return run.network.eval().requires_grad_(False), {
+        "seed": seed,
+        "epochs": state.epoch,
+        "epochs_planned": epochs,
+        "demonstrations": len(learn),
+        "held_out": len(held),
+        "labels": "marginals" if soft else "sequences",
+        "best_epoch": state.best_epoch or None,
+        "seconds": round(state.seconds, 1),
+        "torch": torch.__version__,
+        **{name: None if figure is None else round(figure, 6) for name, figure in state.figures.items()},
+        "config": config.to_json(),
+    }
 
 
-def _finish_epoch(run: Learner, state: RunState, held: NDArray[np.int64]) -> tuple[float, float | None, float | None]:
-    """Measure, keep the best weights, decide whether to stop; the figures of the epoch."""
-    seen = len(run.demonstrations) - len(held)
-    train_loss = state.loss_sum / seen
-    held_loss: float | None = None
-    right: float | None = None
-    if len(held):
-        held_loss, right = run.measure(held)
-        if held_loss < state.best_loss:
-            state.best_loss, state.best_epoch = held_loss, state.epoch + 1
-            if run.config.keep == "best":
-                state.best = copy.deepcopy(run.network.state_dict())
+def _finish_epoch(run: Learner, state: RunState, seen: int, held: NDArray[np.int64]) -> None:
+    """Measure, keep the best weights, decide whether to stop."""
+    held_loss, right = run.measure(held) if len(held) else (None, None)
+    if held_loss is not None and held_loss < state.best_loss:
+        state.best_loss, state.best_epoch = held_loss, state.epoch + 1
+        if run.config.keep == "best":
+            state.best = copy.deepcopy(run.network.state_dict())
+    measured = {"held_out_loss": held_loss, "held_out_whole_order_accuracy": right}
+    state.figures = {"train_loss": state.loss_sum / seen, **measured}
     state.epoch, state.step, state.loss_sum = state.epoch + 1, 0, 0.0
-    state.figures = {"train_loss": train_loss, "held_out_loss": held_loss, "held_out_whole_order_accuracy": right}
     patience = run.config.patience
     state.stopped = patience is not None and len(held) > 0 and state.epoch - state.best_epoch >= patience
-    return train_loss, held_loss, right
 
 
 def _split(demonstrations: Demonstrations, share: float, seed: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -154,35 +156,3 @@ def _split(demonstrations: Demonstrations, share: float, seed: int) -> tuple[NDA
     chosen = np.random.default_rng([seed, _SPLIT]).permutation(groups)[:n_held]
     out = np.isin(np.asarray(demonstrations.groups), chosen)
     return np.flatnonzero(~out), np.flatnonzero(out)
-
-
-def _header_figures(
-    state: RunState,
-    config: TrainConfig,
-    seed: int,
-    epochs: int,
-    learn: NDArray[np.int64],
-    held: NDArray[np.int64],
-    soft: NDArray[np.float32] | None,
-) -> dict[str, Any]:
-    return {
-        "seed": seed,
-        "epochs": state.epoch,
-        "epochs_planned": epochs,
-        "demonstrations": len(learn),
-        "held_out": len(held),
-        "labels": "marginals" if soft is not None else "sequences",
-        "best_epoch": state.best_epoch or None,
-        "seconds": round(state.seconds, 1),
-        "torch": torch.__version__,
-        **{k: None if v is None else round(v, 6) for k, v in state.figures.items()},
-        "config": config.to_json(),
-    }
-
-
-def _round_to_half(network: OrderNetwork) -> None:
-    """Files hold float16; rounding here makes the network in memory and the one read back the same."""
-    with torch.no_grad():
-        for tensor in network.state_dict().values():
-            if tensor.is_floating_point():
-                tensor.copy_(tensor.to(torch.float16).to(tensor.dtype))

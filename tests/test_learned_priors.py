@@ -15,13 +15,13 @@ import numpy as np
 import pytest
 import torch
 
-from learned_priors import bundled
 from learned_priors.checkpoints import load_network, read_tensors, write_tensors
 from learned_priors.encoders import SmallEncoder, build_encoder, encoder_names, register_encoder
+from learned_priors.heads import TemporalDecoder, dilations
 from learned_priors.network_prior import NetworkPrior
 from learned_priors.networks import NetworkConfig, OrderNetwork
 from learned_priors.recipes import RECIPES
-from learned_priors.temporal import TemporalDecoder, dilations
+from learned_priors.weight_store import FOLDER
 from neurosym.errors import CheckpointError, ContractError, InputError, UnknownNameError
 from neurosym.language.demonstrations import Demonstrations
 from neurosym.planning.order_scores import OrderScores
@@ -283,7 +283,7 @@ def folder(file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (tmp_path / "toys-sinkhorn.safetensors").write_bytes(file.read_bytes())
     larger = replace(random_demonstrations(side=16, domain="big"), actions=("one", "two", "three", "four"))
     NetworkPrior("sinkhorn").fit(larger, epochs=1).save(tmp_path / "big-sinkhorn.safetensors")
-    monkeypatch.setattr(bundled, "FOLDER", tmp_path)
+    monkeypatch.setattr("learned_priors.weight_store.FOLDER", tmp_path)
     return tmp_path
 
 
@@ -319,8 +319,7 @@ def test_none_or_several_bundled_weights_are_named(folder: Path) -> None:
 
 
 def test_bundled_weights_are_small_and_say_what_they_are() -> None:
-    found = sorted(bundled.FOLDER.glob("*.safetensors"))
-    for path in found:
+    for path in FOLDER.glob("*.safetensors"):
         network, header = load_network(path)
         assert path.name.startswith(f"{header['domain']}-")
         assert path.name.endswith(f"-{header['prior']}.safetensors")
