@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from learned_priors.metrics import decoded
 from learned_priors.networks import Logits, OrderNetwork
 from neurosym.errors import InputError
-from neurosym.planning.prior import OrderScores
+from neurosym.planning.order_scores import OrderScores
 
 
 @dataclass(frozen=True, eq=False)
