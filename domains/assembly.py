@@ -14,13 +14,13 @@ from typing import Any
 import numpy as np
 
 from domains.assembly_groups import apart_in_groups
-from domains.assembly_removal import apart_one_by_one
+from domains.assembly_removal import apart_one_by_one, removal_domain
 from domains.assembly_samples import SAMPLES, TRAINING, sample
 from neurosym.errors import AssemblyError, InputError, UnknownNameError
 from neurosym.geometry.assembly import NO_TABLE, Assembly
 from neurosym.geometry.blocking.directions import Directions
 from neurosym.geometry.queries import AssemblyGeometry
-from neurosym.language import Domain, Problem
+from neurosym.language import Problem
 from neurosym.language.problem import as_names
 from neurosym.language.problem_family import ProblemFamily
 
@@ -33,14 +33,14 @@ class Setting:
     """How an assembly may be taken apart: the options of `AssemblyFamily.problem`, checked.
 
     Attributes:
-        directions: float64 (k, 3) as tuples: unit vectors, in the order in which they are tried.
+        directions: unit vectors as tuples, in the order in which they are tried; or "axes", those of any assembly.
         paths: one of `PATHS`.
         groups: whether sub-assemblies may leave together.
         gravity: whether what stays must stand.
         held: how many parts may be held meanwhile.
     """
 
-    directions: tuple[tuple[float, float, float], ...]
+    directions: tuple[tuple[float, float, float], ...] | str = "axes"
     paths: str = "straight"
     groups: bool = False
     gravity: bool = True
@@ -55,10 +55,8 @@ class AssemblyFamily(ProblemFamily):
         "Wilson and Latombe, Geometric reasoning about mechanical assembly (Artificial Intelligence 71, 1994): "
         "directional blocking; Livesley (1978): stability by limit analysis"
     )
-    domain: Domain
-
-    def __init__(self) -> None:
-        self.domain = self.problem(0).domain
+    #: The symbols where no option says otherwise; those of groups are in `domains.assembly_groups`.
+    domain = removal_domain(Setting())
 
     def problem(
         self,

@@ -28,6 +28,15 @@ fixed = Fluent("fixed", part)
 _p = part("p")
 
 
+def removal_domain(setting: Setting) -> Domain:
+    """The symbols of removals, one a part."""
+    possible = [can_leave(setting)(_p)]
+    if setting.gravity:
+        possible += [stands_at_first(setting)(), predicates.stable_without(present, held=setting.held)(_p)]
+    remove = Action("remove", _p, pre=[present(_p), ~fixed(_p), *possible], eff=[~present(_p)], label="{p}")
+    return Domain("assembly", fluents=[present, fixed], actions=[remove])
+
+
 def apart_one_by_one(
     world: AssemblyGeometry,
     setting: Setting,
@@ -39,13 +48,9 @@ def apart_one_by_one(
 ) -> Problem:
     """The problem in which an action, named by a part, removes that part."""
     assembly = world.assembly
-    possible = [can_leave(setting)(_p)]
-    if setting.gravity:
-        possible += [stands_at_first(setting)(), predicates.stable_without(present, held=setting.held)(_p)]
-    remove = Action("remove", _p, pre=[present(_p), ~fixed(_p), *possible], eff=[~present(_p)], label="{p}")
     loose = [n for n in assembly.names if n not in assembly.fixed]
     judged_alike = setting.gravity and not setting.held and not assembly.fixed and setting.paths == "straight"
-    return Domain("assembly", fluents=[present, fixed], actions=[remove]).problem(
+    return removal_domain(setting).problem(
         world=world,
         objects={part: assembly.names},
         init=[*(present(n) for n in assembly.names), *(fixed(n) for n in assembly.fixed)],
@@ -98,7 +103,7 @@ def can_leave(setting: Setting) -> Derived:
             clear = check_path(motion, world.assembly, there, ground=ground_of(world.assembly))
             return Verdict(clear.holds, clear.parts, clear.reason or f"{p} is free {motion}.", motion=motion)
         direction = np.array(motion.direction)
-        if min(np.abs(direction - d).max() for d in setting.directions) > 1e-9:
+        if min(np.abs(direction - d).max() for d in world.blocking(setting.directions).vectors) > 1e-9:
             return Verdict(False, (p,), f"{p} cannot go {motion}: that is none of the problem's directions.")
         names = world.in_mask(world.hits_along(world.index[p], direction, there & ~(1 << world.index[p])))
         if world.assembly.has_table and direction[2] < -world.assembly.tolerances.parallel:
