@@ -16,7 +16,7 @@ from neurosym.geometry.step_motion import StepMotion
 from neurosym.support.bitsets import bits
 from neurosym.support.words import listed
 
-#: Poses and ways that each kind of search may ask for one way out (`geometry.paths.extraction`): seconds, mostly.
+#: Poses and ways that each kind of search may ask for one way out (`geometry.paths.path_search`): seconds, mostly.
 MAX_CHECKS = 100_000
 
 #: States that the exact search over moves of groups may visit for one separation.
@@ -65,7 +65,7 @@ def _by_moves(geometry: AssemblyGeometry, moving: int, among: int) -> StepMotion
 
 
 def _by_search(geometry: AssemblyGeometry, moving: int, among: int) -> StepMotion | NoWay:
-    from neurosym.geometry.paths.extraction import KINDS, Failure, extract
+    from neurosym.geometry.paths.path_search import KINDS, Failure, extract
 
     assembly = geometry.assembly
     rng = np.random.default_rng([zlib.crc32(f"{moving:x} {among:x}".encode())])

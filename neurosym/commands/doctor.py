@@ -107,7 +107,7 @@ def pybullet_works() -> str:
 
 
 def _ompl() -> str:
-    from neurosym.geometry.paths.extraction import ompl_works
+    from neurosym.geometry.paths.trees import ompl_works
 
     return ompl_works()
 

@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-Array = NDArray[np.float64]
+from neurosym.support.arrays import Array, Truths
 
 _UNTURNED = np.eye(3)
 
@@ -60,7 +59,7 @@ def shifted(way: Array) -> Array:
     return X
 
 
-def are_rigid(X: Array) -> NDArray[np.bool_]:
+def are_rigid(X: Array) -> Truths:
     """bool (...): which of the matrices, float64 (..., 4, 4), are finite rotations with a shift, last row 0 0 0 1."""
     R = X[..., :3, :3]
     with np.errstate(invalid="ignore", over="ignore"):

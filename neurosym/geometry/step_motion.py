@@ -7,13 +7,12 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from neurosym.errors import InputError
 from neurosym.geometry.rigid_motions import Interpolation
+from neurosym.support.arrays import Array
 from neurosym.support.words import in_words
-
-Array = NDArray[np.float64]
 
 #: Stands for the ground where the name of a part is expected.
 GROUND = "the ground"

@@ -13,15 +13,13 @@ from collections.abc import Sequence
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.contact import collision
 from neurosym.geometry.mesh.inset import inset_vertices
 from neurosym.geometry.rigid_motions import Interpolation
 from neurosym.geometry.shapes import Body, Box, Mesh
-
-Array = NDArray[np.float64]
+from neurosym.support.arrays import Array, Numbers
 
 #: The least step of an advance, as a share of the touching tolerance: an overlap deeper than the tolerance by so much
 #: of it is never missed.
@@ -159,7 +157,7 @@ class Clearance:
         finally:
             collision.place(second, self._Y[j])
 
-    def _slabs(self, i: NDArray[np.int64], j: NDArray[np.int64], start: Array, way: Array) -> Array:
+    def _slabs(self, i: Numbers, j: Numbers, start: Array, way: Array) -> Array:
         """When (share of the way, infinity for never) boxes that do not turn first overlap."""
         axes = self._X[i, :3, :3]
         apart = self._apart(i, j) - np.einsum("d,ndi->ni", start, axes)
@@ -175,7 +173,7 @@ class Clearance:
         meets = (enter < leave - 1e-12) & (leave > 1e-12) & (enter < 1.0 - 1e-12)
         return np.where(meets, np.maximum(enter, 0.0), np.inf)
 
-    def _apart(self, i: NDArray[np.int64], j: NDArray[np.int64]) -> Array:
+    def _apart(self, i: Numbers, j: Numbers) -> Array:
         """From moving boxes' centres to others', where they are assembled, along the axes of the moving ones."""
         found: Array = np.einsum("nd,ndi->ni", self._Y[j, :3, 3] - self._X[i, :3, 3], self._X[i, :3, :3])
         return found

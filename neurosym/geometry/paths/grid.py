@@ -6,12 +6,10 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.shapes import Box
-
-Array = NDArray[np.float64]
+from neurosym.support.arrays import Array, Numbers
 
 #: More cells than this in all are no puzzle: `cells_of` answers None.
 MAX_GRID_CELLS = 100_000
@@ -30,7 +28,7 @@ class GridCells:
     """
 
     names: tuple[str, ...]
-    cells: tuple[NDArray[np.int64], ...]
+    cells: tuple[Numbers, ...]
     pitch: Array
     frame: Array
     origin: Array
@@ -38,7 +36,7 @@ class GridCells:
     def __len__(self) -> int:
         return len(self.cells)
 
-    def shift(self, steps: NDArray[np.int64]) -> Array:
+    def shift(self, steps: Numbers) -> Array:
         """The translation, float64 (3,) in the world, of so many steps along each of the grid's axes."""
         moved: Array = self.frame @ (np.asarray(steps) * self.pitch)
         return moved

@@ -7,14 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from neurosym.errors import InputError
-
-Array = NDArray[np.float64]
+from neurosym.geometry.paths.trees import Growth, connected
+from neurosym.support.arrays import Array
 
 #: How far apart configurations on a motion are checked (largest change of any joint, radians).
 RESOLUTION = 0.04
@@ -68,8 +67,8 @@ def plan_joint_motion(
 
     if not asked(first) or not asked(last):
         return None
-    seed = int(rng.integers(1, 2**31))
-    path = _connected(low, high, first, last, asked, resolution, seed, lambda: checks >= max_checks)
+    growth = Growth(RANGE, resolution, int(rng.integers(1, 2**31)), lambda: checks >= max_checks)
+    path = connected(low, high, first, [last], asked, growth)
     if path is None:
         return None
     for _ in range(SHORTCUTS):
@@ -87,48 +86,3 @@ def is_free_between(a: Array, b: Array, free: Callable[[Array], bool], resolutio
     """Whether all of the straight line from `a` to `b`, float64 (n,), is free, as far as `resolution` sees."""
     steps = max(1, int(np.ceil(np.abs(b - a).max() / resolution)))
     return all(free(a + (b - a) * i / steps) for i in range(steps + 1))
-
-
-def _connected(
-    low: Array,
-    high: Array,
-    start: Array,
-    goal: Array,
-    free: Callable[[Array], bool],
-    resolution: float,
-    seed: int,
-    spent: Callable[[], bool],
-) -> list[Array] | None:
-    """A motion by RRTConnect."""
-    from ompl import base, geometric, util
-
-    # OMPL logs to stdout, which belongs to the program that calls us.
-    util.setLogLevel(util.LogLevel.LOG_NONE)
-    util.RNG.setSeed(seed)
-    n = len(low)
-    space = base.RealVectorStateSpace(n)
-    bounds = base.RealVectorBounds(n)
-    for joint in range(n):
-        bounds.setLow(joint, float(low[joint]))
-        bounds.setHigh(joint, float(high[joint]))
-    space.setBounds(bounds)
-    setup = geometric.SimpleSetup(space)
-
-    def is_free(state: Any) -> bool:
-        # OMPL takes a plain bool only.
-        return free(np.array([state[joint] for joint in range(n)]))
-
-    setup.setStateValidityChecker(is_free)
-    first, last = space.allocState(), space.allocState()
-    for joint in range(n):
-        first[joint], last[joint] = float(start[joint]), float(goal[joint])
-    setup.setStartAndGoalStates(first, last)
-    information = setup.getSpaceInformation()
-    information.setStateValidityCheckingResolution(resolution / float(space.getMaximumExtent()))
-    planner = geometric.RRTConnect(information)
-    planner.setRange(RANGE)
-    setup.setPlanner(planner)
-    setup.solve(base.PlannerTerminationCondition(lambda: bool(spent())))
-    if not setup.haveExactSolutionPath():
-        return None
-    return [np.array([s[joint] for joint in range(n)]) for s in setup.getSolutionPath().getStates()]

@@ -16,13 +16,11 @@ from bisect import bisect_left, bisect_right
 from itertools import pairwise, permutations, product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from neurosym.geometry.paths.levels import commonest, levels_along
 from neurosym.geometry.paths.removal import Removal
 from neurosym.geometry.rigid_motions import Interpolation
-
-Array = NDArray[np.float64]
+from neurosym.support.arrays import Array
 
 #: Orientation (a number) and offset along the three axes.
 Node = tuple[int, float, float, float]

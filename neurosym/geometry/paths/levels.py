@@ -8,11 +8,9 @@ places did. For other shapes the levels of the commonest corners stand in, fille
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from neurosym.geometry.paths.removal import Removal
-
-Array = NDArray[np.float64]
+from neurosym.support.arrays import Array
 
 #: Levels of corners considered for each side, and offsets along an axis, for parts that are no boxes.
 MAX_LEVELS = 24

@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.paths.clearance import Clearance, Floor
 from neurosym.geometry.step_motion import StepMotion
-
-Array = NDArray[np.float64]
+from neurosym.support.arrays import Array
 
 
 @dataclass(frozen=True)

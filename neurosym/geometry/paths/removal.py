@@ -6,7 +6,6 @@ import time
 from collections import Counter
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
 from neurosym.geometry.assembly import Assembly
@@ -15,9 +14,7 @@ from neurosym.geometry.paths.path_check import apart
 from neurosym.geometry.rigid_motions import Interpolation, shifted
 from neurosym.geometry.shapes import Box
 from neurosym.geometry.step_motion import Kind, StepMotion, Track
-
-Array = NDArray[np.float64]
-
+from neurosym.support.arrays import Array
 
 _UNTURNED = np.eye(3)
 
@@ -74,10 +71,10 @@ class Removal:
         if self.spent():
             raise OutOfBudget
 
-    def spent(self) -> bool:
-        """Whether the budget is used up."""
+    def spent(self, checks: float = np.inf) -> bool:
+        """Whether the budget, or so many checks of it, are used up."""
         late = self._deadline is not None and time.monotonic() > self._deadline
-        return late or self.checks >= self.max_checks
+        return late or self.checks >= min(self.max_checks, checks)
 
     def hit(self, X: Array) -> bool:
         """Whether the moving parts, at a pose (4, 4), are in others or below the ground."""

@@ -6,11 +6,11 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from neurosym.errors import InputError
 from neurosym.geometry.paths.grid import GridCells
 from neurosym.geometry.paths.voxel_separation import DIRECTIONS, Offset
+from neurosym.support.arrays import Numbers
 from neurosym.support.bitsets import bits
 
 #: An offset (x, y, z) is one number, x + y * RADIX + z * RADIX**2: differences of offsets are differences of numbers.
@@ -117,7 +117,7 @@ class Gaps:
 class _Lines:
     """How far one part can go before it meets another, for any relative offset; answers are kept."""
 
-    def __init__(self, a: NDArray[np.int64], b: NDArray[np.int64]) -> None:
+    def __init__(self, a: Numbers, b: Numbers) -> None:
         differences = {(x, y, z) for x, y, z in (b[None] - a[:, None]).reshape(-1, 3).tolist()}
         self._ahead: list[dict[tuple[int, int], list[int]]] = [{}, {}, {}]
         for x, y, z in sorted(differences):

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from neurosym.geometry.paths.grid import GridCells
 from neurosym.geometry.step_motion import StepMotion, Track
+from neurosym.support.arrays import Numbers
 from neurosym.support.bitsets import bits
 
 #: The six directions, opposite ones side by side: ``d ^ 1`` is the opposite of ``d``.
@@ -121,7 +121,7 @@ def separation_path(cells: GridCells, separation: Separation, *, home: bool = Tr
     return StepMotion(leaving, tracks=tuple(tracks), kind="moves", moves=separation.level)
 
 
-def _way_out(cells: GridCells, keys: list[dict[int, NDArray[np.int64]]], parts: list[int]) -> int:
+def _way_out(cells: GridCells, keys: list[dict[int, Numbers]], parts: list[int]) -> int:
     """Cells to go until two halves are clear of one another, at rest and while each goes back to its shape."""
     spots = [cells.cells[p] + key[p] for p in parts for key in keys]
     low, high = np.min([s.min(axis=0) for s in spots], axis=0), np.max([s.max(axis=0) for s in spots], axis=0)

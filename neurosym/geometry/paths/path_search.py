@@ -1,29 +1,27 @@
 """Paths for parts that no straight line takes out: a lattice of translations, then OMPL.
 
-Searches are counted in checks of poses, not in seconds, so the same seed gives the same path on any machine. OMPL's
-own random numbers have one seed a process, set anew for each search from the caller's generator (generators made by
-OMPL afterwards, in another's code, then follow from it, too). No path leaves here that `check_path` has not confirmed.
+Searches are counted in checks of poses, not in seconds, so the same seed gives the same path on any machine. No path
+leaves here that `check_path` has not confirmed.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from neurosym.errors import InputError
 from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.paths.lattice import Lattice
 from neurosym.geometry.paths.path_check import check_path
 from neurosym.geometry.paths.removal import OutOfBudget, Removal
+from neurosym.geometry.paths.trees import Growth, connected, grown_out
 from neurosym.geometry.rigid_motions import Interpolation, shifted
 from neurosym.geometry.step_motion import Kind, StepMotion
-
-Array = NDArray[np.float64]
+from neurosym.support.arrays import Array
 
 #: What `extract` tries, in this order.
 KINDS: tuple[Kind, ...] = ("lattice", "translation", "rigid")
@@ -144,10 +142,11 @@ def _turned(removal: Removal, max_checks: int) -> list[Array] | None:
 def _grown(removal: Removal, kind: Kind, rng: np.random.Generator) -> list[Array] | None:
     """Poses of a way out that a random tree found, made shorter and confirmed without gaps; None: none was."""
     ranges = RANGES[kind]
-    for attempt, length in enumerate(ranges):
+    for attempt, step in enumerate(ranges):
         until = removal.checks + (removal.max_checks - removal.checks) // (len(ranges) - attempt)
         seed = int(rng.integers(1, 2**31 - 1))
-        poses = _tree(removal, kind == "rigid", length, RESOLUTION / 2**attempt, until, seed)
+        growth = Growth(step, RESOLUTION / 2**attempt, seed, partial(removal.spent, until))
+        poses = _tree(removal, kind == "rigid", growth)
         if poses is None:
             continue
         if all(removal.is_clear(Interpolation(a, b, removal.centre)) for a, b in pairwise(poses)):
@@ -157,91 +156,29 @@ def _grown(removal: Removal, kind: Kind, rng: np.random.Generator) -> list[Array
     return None
 
 
-def _tree(
-    removal: Removal, turning: bool, length: float, resolution: float, max_checks: int, seed: int
-) -> list[Array] | None:
-    """One attempt with OMPL: RRTConnect towards places outside, or RRT over rigid motions until it is out.
+def _tree(removal: Removal, turning: bool, growth: Growth) -> list[Array] | None:
+    """One attempt with OMPL: towards places outside, or over rigid motions until it is out.
 
-    States are where the moving parts' centre is, from its assembled place, in smallest extents, and its rotation.
+    Places are where the moving parts' centre is, from its assembled place, in smallest extents.
     """
-    from ompl import base, geometric, util
+    scale, centre = removal.assembly.smallest_extent, removal.centre
+    reach = float(np.linalg.norm(removal.own_points - centre, axis=1).max()) + scale
+    low = (removal.other_points.min(axis=0) - reach - centre) / scale
+    high = (removal.other_points.max(axis=0) + reach - centre) / scale
 
-    # OMPL logs to stdout, which belongs to the program that calls us.
-    util.setLogLevel(util.LogLevel.LOG_NONE)
-    util.RNG.setSeed(seed)
-    scale = removal.assembly.smallest_extent
-    space = base.SE3StateSpace() if turning else base.RealVectorStateSpace(3)
-    reach = float(np.linalg.norm(removal.own_points - removal.centre, axis=1).max()) + scale
-    low = (removal.other_points.min(axis=0) - reach - removal.centre) / scale
-    high = (removal.other_points.max(axis=0) + reach - removal.centre) / scale
-    bounds = base.RealVectorBounds(3)
-    for axis in range(3):
-        bounds.setLow(axis, float(low[axis]))
-        bounds.setHigh(axis, float(high[axis]))
-    space.setBounds(bounds)
-    setup = geometric.SimpleSetup(space)
+    def pose(X: Array) -> Array:
+        posed = X.copy()
+        posed[:3, 3] = centre + scale * X[:3, 3] - X[:3, :3] @ centre
+        return posed
 
-    def pose(state: Any) -> Array:
-        if not turning:
-            return shifted(scale * np.array([state[0], state[1], state[2]]))
-        q = state.rotation()
-        X = np.eye(4)
-        X[:3, :3] = _rotation(q.x, q.y, q.z, q.w)
-        at = removal.centre + scale * np.array([state.getX(), state.getY(), state.getZ()])
-        X[:3, 3] = at - X[:3, :3] @ removal.centre
-        return X
-
-    def is_free(state: Any) -> bool:
-        # OMPL takes a plain bool only.
-        return not removal.hit(pose(state))
-
-    setup.setStateValidityChecker(is_free)
-    start = space.allocState()
     if turning:
-        start.setXYZ(0.0, 0.0, 0.0)
-        start.rotation().setIdentity()
-    else:
-        start[0], start[1], start[2] = 0.0, 0.0, 0.0
-    setup.setStartState(start)
-    information = setup.getSpaceInformation()
-    information.setStateValidityCheckingResolution(resolution / float(space.getMaximumExtent()))
-
-    class Out(base.GoalRegion):  # type: ignore[misc]
-        def distanceGoal(self, state: Any) -> float:
-            return removal.left(pose(state)) / scale
-
-    # Python must hold the goal: OMPL keeps no reference that counts.
-    if turning:
-        goal = Out(information)
-        goal.setThreshold(1e-9)
-        planner = geometric.RRT(information)
-    else:
-        goal = base.GoalStates(information)
-        for axis in range(3):
-            for edge in (low, high):
-                state = space.allocState()
-                state[0], state[1], state[2] = (float(edge[k]) if k == axis else 0.0 for k in range(3))
-                if is_free(state):
-                    goal.addState(state)
-        if not goal.hasStates():
-            return None
-        planner = geometric.RRTConnect(information)
-    planner.setRange(length)
-    setup.setGoal(goal)
-    setup.setPlanner(planner)
-    setup.solve(base.PlannerTerminationCondition(lambda: bool(removal.checks >= max_checks or removal.spent())))
-    if not setup.haveExactSolutionPath():
-        return None
-    return [pose(state) for state in setup.getSolutionPath().getStates()]
-
-
-def _rotation(x: float, y: float, z: float, w: float) -> list[list[float]]:
-    """The rotation matrix of a unit quaternion; scipy's takes longer than the collision check that follows."""
-    return [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-    ]
+        motions = grown_out(
+            low, high, lambda X: not removal.hit(pose(X)), lambda X: removal.left(pose(X)) / scale, growth
+        )
+        return None if motions is None else list(map(pose, motions))
+    outside = [np.eye(3)[axis] * edge for axis in range(3) for edge in (low, high)]
+    places = connected(low, high, np.zeros(3), outside, lambda at: not removal.hit(shifted(scale * at)), growth)
+    return None if places is None else [shifted(scale * at) for at in places]
 
 
 def _shortened(removal: Removal, poses: list[Array], rng: np.random.Generator) -> list[Array]:
@@ -253,33 +190,3 @@ def _shortened(removal: Removal, poses: list[Array], rng: np.random.Generator) -
         if j - i > 1 and removal.is_clear(Interpolation(poses[i], poses[j], removal.centre)):
             poses = [*poses[: i + 1], *poses[j:]]
     return poses
-
-
-def ompl_works() -> str:
-    """Plan a way round a wall in the plane with OMPL; returns one line about it, raises where it fails."""
-    from ompl import base, geometric, util
-
-    # OMPL logs to stdout, which belongs to the program that calls us.
-    util.setLogLevel(util.LogLevel.LOG_NONE)
-    space = base.RealVectorStateSpace(2)
-    bounds = base.RealVectorBounds(2)
-    bounds.setLow(0.0)
-    bounds.setHigh(1.0)
-    space.setBounds(bounds)
-    setup = geometric.SimpleSetup(space)
-
-    def free(state: base.State) -> bool:
-        # A wall at x = 0.5 with a gap above y = 0.7.
-        return bool(abs(state[0] - 0.5) > 0.05 or state[1] > 0.7)
-
-    setup.setStateValidityChecker(free)
-    start, goal = space.allocState(), space.allocState()
-    start[0], start[1], goal[0], goal[1] = 0.1, 0.1, 0.9, 0.1
-    setup.setStartAndGoalStates(start, goal)
-    setup.setPlanner(geometric.RRTConnect(setup.getSpaceInformation()))
-    if not setup.solve(5.0):
-        raise RuntimeError("RRTConnect found no way round a wall in the plane within 5 s")
-    states = setup.getSolutionPath().getStates()
-    if not all(free(state) for state in states):
-        raise RuntimeError("RRTConnect answered with a path through the wall")
-    return f"RRTConnect went round a wall in the plane in {len(states)} states"
