@@ -16,9 +16,9 @@ import neurosym as ns
 from neurosym.errors import InputError, UnknownNameError
 from neurosym.geometry.mesh.inset import inset_vertices
 from neurosym.geometry.paths.clearance import Clearance
-from neurosym.geometry.paths.path_search import Failure, extract
 from neurosym.geometry.paths.grid import cells_of
 from neurosym.geometry.paths.path_check import check_path
+from neurosym.geometry.paths.path_search import Failure, extract
 from neurosym.geometry.paths.voxel_search import first_separation
 from neurosym.geometry.paths.voxel_separation import Separation
 from neurosym.geometry.rigid_motions import Interpolation, shifted
