@@ -1,0 +1,270 @@
+"""Which subsets of parts stand, judged by springs: what a simulation, and a hand, confirms."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from neurosym.geometry.contact.contacts import Contact
+from neurosym.geometry.stability.contact_springs import contact_springs
+from neurosym.geometry.stability.holding import parts_to_hold
+from neurosym.geometry.stability.load_paths import LoadPaths
+from neurosym.geometry.stability.settling import Settled, settle
+from neurosym.geometry.stability.spring_verdicts import (
+    ContactForces,
+    Movement,
+    SpringStanding,
+    contact_forces,
+    movements,
+    moving_parts,
+)
+from neurosym.geometry.stability.springs import Array, Numbers, SpringNumbers, Truths
+from neurosym.geometry.stability.standing import Stability
+from neurosym.support.bitsets import bits
+
+#: Gravity, and the horizontal directions in which `SpringStability.margin` tilts it.
+DOWN = np.array([0.0, 0.0, -1.0])
+TILTS = np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -1.0, 0.0]])
+#: Halvings of the angle of tilt, from 90 degrees: to 0.2 degrees.
+_HALVINGS = 9
+
+
+class SpringStability:
+    """Answers `standing(subset)` by springs. Movable parts that hang together are judged, and remembered, by themselves.
+
+    A question is answered by the first of these that can:
+
+    * loads that go straight down (`LoadPaths`): a proof that all stands, in no time;
+    * single parts beside a gap that fall though all others are immovable, by limit analysis: a proof of a fall;
+    * springs.
+
+    Where springs let something fall, limit analysis is asked too: where no forces balance the parts, their fall is
+    a promise about smaller subsets.
+
+    Args:
+        limit: limit analysis of the same parts.
+        patches: contact patches between parts (`merged_patches`).
+        centres: float64 (n, 3): centres of mass.
+        friction: Coulomb's coefficient.
+        fixed: bitset of the parts that never move.
+        gaps: float64 (len(patches),): how far apart the faces of each patch are (length): play, that closes first.
+        gravity: float64 (3,), unit; or zeros, where there is none.
+        remember: whether answers are kept.
+
+    Attributes:
+        masses, touching, supports, on_table: as `Stability` has them.
+        asked: how groups were judged: {"load paths", "single parts", "springs"} -> how many.
+    """
+
+    def __init__(
+        self,
+        limit: Stability,
+        patches: Sequence[Contact],
+        centres: Array,
+        *,
+        friction: float,
+        fixed: int = 0,
+        gaps: Array | None = None,
+        gravity: Array = DOWN,
+        numbers: SpringNumbers = SpringNumbers(),
+        remember: bool = True,
+    ) -> None:
+        self.limit, self.fixed, self.gravity, self.remember = limit, fixed, gravity, remember
+        self.masses, self.touching = limit.masses, limit.touching
+        self.supports, self.on_table = limit.supports, limit.on_table
+        self.springs = contact_springs(
+            patches, limit.masses, centres, friction=friction, gaps=gaps, numbers=numbers
+        )
+        straight = bool(np.array_equal(gravity, DOWN)) and not self.springs.gap.any()
+        self._paths = LoadPaths(patches, centres) if straight else None
+        self.asked = dict.fromkeys(("load paths", "single parts", "springs"), 0)
+        self._groups: dict[tuple[int, int], SpringStanding] = {}
+
+    def standing(self, subset: int, held: int = 0) -> SpringStanding:
+        """Whether the parts in a bitset stand while those in `held` and the fixed parts cannot move."""
+        held &= subset
+        movable = subset & ~held & ~self.fixed
+        if self._paths is not None and self._paths.carry(subset, movable):
+            self.asked["load paths"] += 1
+            return SpringStanding(True, 0, held)
+        for group in self.groups(movable):
+            answer = self._group(group, self._touching(group) & subset & ~movable)
+            if not answer.stands:
+                return replace(answer, held=held)
+        return SpringStanding(True, 0, held)
+
+    def standing_when_held(self, subset: int, most: int, *, hands: int = -1) -> SpringStanding:
+        """Whether the parts in a bitset stand when the right ones, `most` of them at the most, are held.
+
+        Args:
+            subset: bitset of the parts that are there.
+            most: how many may be held.
+            hands: bitset of the parts that can be held; default any that is not fixed. Of a subset that falls, only parts
+                that move are tried.
+
+        Returns:
+            `held` is what to hold; if nothing helps, `moving` are the parts that move in one motion or another.
+        """
+        hands &= subset & ~self.fixed
+        promises = True
+
+        def ask(held: int) -> SpringStanding:
+            nonlocal promises
+            answer = self.standing(subset, held)
+            promises &= answer.stands or answer.promises
+            return answer
+
+        held, motions = parts_to_hold(ask, hands, most)
+        if held is not None:
+            return SpringStanding(True, 0, held)
+        return SpringStanding(False, functools.reduce(int.__or__, motions, 0), balanced=not promises)
+
+    def groups(self, movable: int) -> list[int]:
+        """Bitsets of movable parts that hang together by contacts."""
+        found = []
+        while movable:
+            group = fresh = movable & -movable
+            while fresh:
+                fresh = self._touching(fresh) & movable & ~group
+                group |= fresh
+            found.append(group)
+            movable &= ~group
+        return found
+
+    # -- evidence ---------------------------------------------------------------------------------------------
+
+    def movements(self, subset: int, held: int = 0) -> tuple[Movement, ...]:
+        """How parts of a subset begin to fall, the one that falls most first; none if it stands."""
+        settled = self.settled(subset, held)
+        if settled.stands:
+            return ()
+        found = []
+        for movement in movements(self.springs, settled):
+            below, beside = self.supports[movement.part], self.touching[movement.part]
+            found.append(replace(movement, lost=below & ~subset or beside & ~subset))
+        return tuple(found)
+
+    def forces(self, subset: int, held: int = 0) -> ContactForces:
+        """The forces at contacts in which a subset comes to rest."""
+        return contact_forces(self.springs, self.settled(subset, held))
+
+    def margin(self, subset: int, held: int = 0) -> float:
+        """The largest tilt of gravity (degrees), in each of four horizontal directions, that a subset bears; 0: none."""
+        if not self.standing(subset, held).stands:
+            return 0.0
+        return min(self._margin(subset, held, direction) for direction in TILTS)
+
+    # -- loads ------------------------------------------------------------------------------------------------
+
+    def settled(
+        self,
+        subset: int,
+        held: int = 0,
+        *,
+        loads: Mapping[int, Array] | None = None,
+        gravity: Array | None = None,
+        slippery: int = 0,
+    ) -> Settled:
+        """Where a subset comes to rest, all of it at once: nothing is remembered.
+
+        Args:
+            loads: for some parts a force and a torque about the centre of mass, float64 (6,): masses (times gravity)
+                and lengths as the parts have.
+            gravity: float64 (3,), instead of the usual.
+            slippery: bitset of parts that rub on nothing.
+        """
+        there, moving = self._mask(subset), self._mask(subset & ~held & ~self.fixed)
+        there[-1] = True
+        load = self.springs.gravity(self.gravity if gravity is None else gravity)
+        for part, wrench in (loads or {}).items():
+            load[part] += self.springs.scaled(np.asarray(wrench, dtype=np.float64), part)
+        corners = self.springs.corners_of(there, moving)
+        smooth = self._mask(slippery)
+        rubs_not = smooth[self.springs.a[corners]] | smooth[self.springs.b[corners]]
+        return settle(self.springs, np.flatnonzero(moving), corners, load, slippery=rubs_not)
+
+    def standing_while_pulled(self, subset: int, part: int, direction: Array, held: int = 0) -> SpringStanding:
+        """Whether a subset stands as one of its parts begins to be drawn along a direction (3,).
+
+        What touches the part is dragged along with mu times the force that presses the two. The part itself goes
+        where it is drawn: it still carries what lies on it, but holds nothing by friction.
+        """
+        loads = self.drag(subset, part, direction, held)
+        settled = self.settled(subset, held | 1 << part, loads=loads, slippery=1 << part)
+        return SpringStanding(settled.stands, 0 if settled.stands else moving_parts(settled), held)
+
+    def drag(self, subset: int, part: int, direction: Array, held: int = 0) -> dict[int, Array]:
+        """The force and torque, float64 (6,), on each part that one touches as it is drawn along a direction (3,)."""
+        springs, settled = self.springs, self.settled(subset, held)
+        way = np.asarray(direction, dtype=np.float64) / np.linalg.norm(direction)
+        loads: dict[int, Array] = {}
+        for k, corner in enumerate(settled.corners):
+            pair = int(springs.a[corner]), int(springs.b[corner])
+            other = pair[0] if pair[1] == part else pair[1]
+            if part not in pair or other < 0 or settled.forces[k, 0] <= 0:
+                continue
+            along = way - (way @ springs.axes[corner, 0]) * springs.axes[corner, 0]
+            size = float(np.linalg.norm(along))
+            if size > 1e-9:
+                force = springs.unit * springs.friction * settled.forces[k, 0] * along / size
+                torque = np.cross(springs.at[corner] - springs.centres[other], force)
+                loads[other] = loads.get(other, np.zeros(6)) + np.concatenate([force, torque])
+        return loads
+
+    # -- one group --------------------------------------------------------------------------------------------
+
+    def _group(self, group: int, around: int) -> SpringStanding:
+        answer = self._groups.get((group, around))
+        if answer is None:
+            answer = self._judge(group, around)
+            if self.remember:
+                self._groups[group, around] = answer
+        return answer
+
+    def _judge(self, group: int, around: int) -> SpringStanding:
+        there = group | around
+        if self._paths is not None:
+            falls = self._single_fall(group, there)
+            if falls:
+                self.asked["single parts"] += 1
+                return SpringStanding(False, falls, balanced=False)
+        self.asked["springs"] += 1
+        settled = self.settled(there, around)
+        if settled.stands:
+            return SpringStanding(True)
+        if self._paths is not None:
+            by_limit = self.limit.standing(there, around)
+            if not by_limit.stands:
+                return SpringStanding(False, by_limit.moving, balanced=False)
+        return SpringStanding(False, moving_parts(settled))
+
+    def _single_fall(self, group: int, there: int) -> int:
+        """A part that has lost a neighbour and falls even if all others cannot move, as a bitset; 0: none."""
+        for part in bits(group):
+            near = self.touching[part]
+            if near & ~there and not (self._paths and self._paths.hands_on(part, there)):
+                around = near & there
+                if not self.limit.standing(around | 1 << part, around).stands:
+                    return 1 << part
+        return 0
+
+    def _margin(self, subset: int, held: int, direction: Array) -> float:
+        low, high = 0.0, 90.0
+        for _ in range(_HALVINGS):
+            tilt = np.radians((low + high) / 2)
+            gravity = np.cos(tilt) * self.gravity + np.sin(tilt) * direction
+            stands = self.settled(subset, held, gravity=gravity).stands
+            low, high = ((low + high) / 2, high) if stands else (low, (low + high) / 2)
+        return low
+
+    def _touching(self, parts: int) -> int:
+        return functools.reduce(int.__or__, (self.touching[p] for p in bits(parts)), 0)
+
+    def _mask(self, parts: int) -> Truths:
+        """bool (n + 1,): a bitset; the last stands for the table."""
+        mask = np.zeros(len(self.masses) + 1, dtype=bool)
+        mask[bits(parts)] = True
+        return mask

@@ -1,0 +1,24 @@
+"""Loops that numba compiles when they are first called, and keeps on disk: beside the source, else in the user's cache.
+
+Numba looks for changes only in the file of the function that is called: compiled functions that call one another belong
+into one file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TypeVar
+
+from numba import njit
+
+F = TypeVar("F", bound=Callable[..., object])
+
+
+def compiled(function: F) -> F:
+    """The function as machine code, once it is called; division by zero gives infinity, as in numpy."""
+    options = {"nogil": True, "error_model": "numpy"}
+    try:
+        fast: F = njit(function, cache=True, **options)
+    except RuntimeError:  # neither place can be written: compiled anew in each process
+        fast = njit(function, **options)
+    return fast
