@@ -35,6 +35,7 @@ class Contact:
         points: float64 (k, 3), k >= 3: the corners of the patch's convex hull, in the world.
         normal: float64 (3,): unit normal of the patch, from a to b.
         area: of the patch (length squared).
+        gap: how far apart the two faces are (length); 0 where they overlap.
     """
 
     a: int
@@ -42,6 +43,7 @@ class Contact:
     points: Array
     normal: Array
     area: float
+    gap: float = 0.0
 
 
 def find_contacts(assembly: Assembly, surfaces: BodySurfaces) -> tuple[Contact, ...]:
@@ -108,7 +110,8 @@ def _box_contacts(assembly: Assembly, pairs: Numbers) -> list[Contact]:
         corners[:, v] = low[k, v], low[k, v], high[k, v], high[k, v]
         points = corners @ R[k].T + X[a[k], :3, 3]
         area = float(overlap[k, u] * overlap[k, v])
-        found.append(Contact(int(a[k]), int(b[k]), points, sign * R[k, :, n], area))
+        gap = max(0.0, -float(overlap[k, n]))
+        found.append(Contact(int(a[k]), int(b[k]), points, sign * R[k, :, n], area, gap))
     return found
 
 
@@ -123,7 +126,8 @@ def _table_contacts(assembly: Assembly) -> list[Contact]:
         points = hull_points(vertices[vertices[:, 2] <= reach], down)
         area = _area(points, down)
         if _is_wide(points, area, assembly.touch):
-            found.append(Contact(int(i), TABLE, points, down, area))
+            gap = max(0.0, float(points[:, 2].min()) - assembly.ground)
+            found.append(Contact(int(i), TABLE, points, down, area, gap))
     return found
 
 
@@ -187,15 +191,16 @@ def _facet_contacts(
     ]
     apart = heights[1] - heights[0]
     near = (apart <= gap) & (apart >= -assembly.mate)
-    number, clipped, areas = number[near], clipped[near], areas[near]
+    number, clipped, areas, apart = number[near], clipped[near], areas[near], apart[near]
     total = np.bincount(number, areas, len(planes))
+    gaps = np.bincount(number, areas * np.maximum(apart, 0.0), len(planes)) / np.maximum(total, 1e-300)
     uv, source = shapely.get_coordinates(clipped, return_index=True)
     found = []
     for k, corners in _hulls(uv, number[source], 1e-2 * assembly.touch):
         points = origins[k] + corners @ axes[k].T
         if _is_wide(points, _area(points, normals[k]), assembly.touch):
             a, b = surfaces.body[i[starts[k]]], surfaces.body[j[starts[k]]]
-            found.append(Contact(int(a), int(b), points, normals[k], float(total[k])))
+            found.append(Contact(int(a), int(b), points, normals[k], float(total[k]), float(gaps[k])))
     return found
 
 

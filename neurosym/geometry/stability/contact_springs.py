@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from neurosym.geometry.contact.contacts import TABLE, Contact
 from neurosym.geometry.stability.patches import patch_axes
-from neurosym.geometry.stability.springs import Array, Springs, SpringNumbers
+from neurosym.geometry.stability.springs import DEFAULT_NUMBERS, Array, SpringNumbers, Springs
 
 
 def contact_springs(
@@ -19,7 +19,7 @@ def contact_springs(
     *,
     friction: float,
     gaps: Array | None = None,
-    numbers: SpringNumbers = SpringNumbers(),
+    numbers: SpringNumbers = DEFAULT_NUMBERS,
 ) -> Springs:
     """The springs of parts with these masses (n,) and centres (n, 3) that touch in these patches.
 
@@ -63,7 +63,7 @@ def contact_springs(
 
 
 def _shares(patch: Contact) -> Array:
-    """The share of a patch about each of its corners, float64 (k,): half of the two triangles that it has with the middle."""
+    """The share of a patch about each corner, float64 (k,): half of the two triangles between it and the middle."""
     arms = patch.points - patch.points.mean(axis=0)
     triangles = np.abs(np.cross(arms, np.roll(arms, -1, axis=0)) @ patch.normal)
     shares = triangles + np.roll(triangles, 1)

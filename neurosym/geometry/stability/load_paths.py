@@ -34,7 +34,7 @@ class LoadPaths:
     def __init__(self, patches: Sequence[Contact], centres: Array) -> None:
         n = len(centres)
         self.centres = centres[:, :2]
-        #: For each part, what it lies on and what lies on it: (number of the other, TABLE for the table, corners (k, 2)).
+        #: What each part lies on, and what lies on it: number of the other (or TABLE), and corners (k, 2).
         self.below: list[list[tuple[int, Array]]] = [[] for _ in range(n)]
         self.above: list[list[tuple[int, Array]]] = [[] for _ in range(n)]
         self.near = [0] * n

@@ -27,7 +27,7 @@ def merged_patches(assembly: Assembly, contacts: tuple[Contact, ...]) -> tuple[C
     forces at its corners.
     """
     owners, touch = assembly.owners, assembly.touch
-    groups: dict[tuple[int, int], list[tuple[Array, float, list[Array], float]]] = {}
+    groups: dict[tuple[int, int], list[tuple[Array, float, list[Array], float, float]]] = {}
     for c in contacts:
         a, b = int(owners[c.a]), TABLE if c.b == TABLE else int(owners[c.b])
         normal = c.normal
@@ -35,17 +35,17 @@ def merged_patches(assembly: Assembly, contacts: tuple[Contact, ...]) -> tuple[C
             a, b, normal = b, a, -normal
         offset = float(c.points.mean(axis=0) @ normal)
         planes = groups.setdefault((a, b), [])
-        for k, (known, distance, points, area) in enumerate(planes):
+        for k, (known, distance, points, area, gap) in enumerate(planes):
             if known @ normal > 1 - 1e-6 and abs(distance - offset) <= 2 * touch:
-                planes[k] = (known, distance, [*points, c.points], area + c.area)
+                planes[k] = (known, distance, [*points, c.points], area + c.area, min(gap, c.gap))
                 break
         else:
-            planes.append((normal, offset, [c.points], c.area))
+            planes.append((normal, offset, [c.points], c.area, c.gap))
     found = []
     for (a, b), planes in groups.items():
-        for normal, _, points, area in planes:
+        for normal, _, points, area, gap in planes:
             corners = points[0] if len(points) == 1 else hull_points(np.concatenate(points), normal)
-            found.append(Contact(a, b, corners, normal, area))
+            found.append(Contact(a, b, corners, normal, area, gap))
     return tuple(found)
 
 

@@ -14,7 +14,7 @@ from neurosym.geometry.stability.springs import Array, Numbers, Springs, Truths
 
 #: Newton's steps in a round while nothing falls: the bounds are about to change. What falls is followed to the end.
 _STEPS, _MOST_STEPS = 3, 200
-#: Forces left over on a part, as a share of its weight, with which a round may end: while all stands, and while some fall.
+#: Forces left over on a part, as a share of its weight, with which a round may end: while all stands, while some fall.
 _LEFT_STANDING, _LEFT_FALLING = 1e-3, 1e-1
 #: Forces below this share of those on a part are rounding.
 _ROUNDING = 1e-9
@@ -119,7 +119,9 @@ class _System:
         place[parts] = np.arange(m)
         pa, pb = place[springs.a[corners]], place[springs.b[corners]]
         both = (pa >= 0) & (pb >= 0)
-        graph = csr_array((np.ones(2 * both.sum()), (np.r_[pa[both], pb[both]], np.r_[pb[both], pa[both]])), shape=(m, m))
+        graph = csr_array(
+            (np.ones(2 * both.sum()), (np.r_[pa[both], pb[both]], np.r_[pb[both], pa[both]])), shape=(m, m)
+        )
         self.parts: Numbers = parts[reverse_cuthill_mckee(graph, symmetric_mode=True)]
         place[self.parts] = np.arange(m)
         self.pa, self.pb = place[springs.a[corners]], place[springs.b[corners]]
@@ -142,7 +144,7 @@ class _System:
         return np.asarray(friction * np.maximum(forces[:, 0] - rounding, 0.0))
 
     def anchors(self, d: Array) -> Array:
-        """float64 (k, 2): where along the contact each tangential spring began: where its gap closed, on a straight way."""
+        """float64 (k, 2): where each tangential spring began: where its gap closed, on a straight way."""
         if not self.gap.any():
             return np.zeros((len(d), 2))
         pressed = np.maximum(-d[:, 0] - self.gap, 0.0)

@@ -93,7 +93,7 @@ def fill(
     pa: Numbers,
     pb: Numbers,
 ) -> None:
-    """The Hessian of the energy, lower band: band[j, i - j] = H[i, j]. `ground`: float64 (m,), stiffness of each part."""
+    """The Hessian of the energy, lower band: band[j, i - j] = H[i, j]. `ground`, float64 (m,): stiffness a part."""
     band[:] = 0.0
     for p in range(len(ground)):
         for j in range(6):

@@ -8,10 +8,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from neurosym.geometry.contact.contacts import Contact
+from neurosym.geometry.assembly import Assembly
+from neurosym.geometry.contact.contacts import TABLE, Contact, find_contacts
 from neurosym.geometry.stability.contact_springs import contact_springs
 from neurosym.geometry.stability.holding import parts_to_hold
 from neurosym.geometry.stability.load_paths import LoadPaths
+from neurosym.geometry.stability.patches import masses, merged_patches
 from neurosym.geometry.stability.settling import Settled, settle
 from neurosym.geometry.stability.spring_verdicts import (
     ContactForces,
@@ -21,19 +23,21 @@ from neurosym.geometry.stability.spring_verdicts import (
     movements,
     moving_parts,
 )
-from neurosym.geometry.stability.springs import Array, Numbers, SpringNumbers, Truths
+from neurosym.geometry.stability.springs import DEFAULT_NUMBERS, Array, SpringNumbers, Truths
 from neurosym.geometry.stability.standing import Stability
 from neurosym.support.bitsets import bits
 
 #: Gravity, and the horizontal directions in which `SpringStability.margin` tilts it.
 DOWN = np.array([0.0, 0.0, -1.0])
 TILTS = np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -1.0, 0.0]])
+#: Of a normal: a part is under another when it points down by more (45 degrees).
+_UNDER = 0.7
 #: Halvings of the angle of tilt, from 90 degrees: to 0.2 degrees.
 _HALVINGS = 9
 
 
 class SpringStability:
-    """Answers `standing(subset)` by springs. Movable parts that hang together are judged, and remembered, by themselves.
+    """Answers `standing(subset)` by springs. Movable parts that hang together are judged and remembered by themselves.
 
     A question is answered by the first of these that can:
 
@@ -55,7 +59,10 @@ class SpringStability:
         remember: whether answers are kept.
 
     Attributes:
-        masses, touching, supports, on_table: as `Stability` has them.
+        masses: float64 (n_parts,): density times volume.
+        touching: touching[i] is a bitset of the parts in contact with part i.
+        on_table: bitset of the parts in contact with the table.
+        supports: supports[i] is a bitset of the parts with a contact under part i (normal within 45 degrees).
         asked: how groups were judged: {"load paths", "single parts", "springs"} -> how many.
     """
 
@@ -69,15 +76,14 @@ class SpringStability:
         fixed: int = 0,
         gaps: Array | None = None,
         gravity: Array = DOWN,
-        numbers: SpringNumbers = SpringNumbers(),
+        numbers: SpringNumbers = DEFAULT_NUMBERS,
         remember: bool = True,
     ) -> None:
         self.limit, self.fixed, self.gravity, self.remember = limit, fixed, gravity, remember
-        self.masses, self.touching = limit.masses, limit.touching
-        self.supports, self.on_table = limit.supports, limit.on_table
-        self.springs = contact_springs(
-            patches, limit.masses, centres, friction=friction, gaps=gaps, numbers=numbers
-        )
+        self.masses = limit.masses
+        self.touching, self.supports, self.on_table = _neighbours(patches, len(centres))
+        self.springs = contact_springs(patches, limit.masses, centres, friction=friction, gaps=gaps, numbers=numbers)
+        # Neither proof knows of play, nor of a tilted world.
         straight = bool(np.array_equal(gravity, DOWN)) and not self.springs.gap.any()
         self._paths = LoadPaths(patches, centres) if straight else None
         self.asked = dict.fromkeys(("load paths", "single parts", "springs"), 0)
@@ -102,8 +108,7 @@ class SpringStability:
         Args:
             subset: bitset of the parts that are there.
             most: how many may be held.
-            hands: bitset of the parts that can be held; default any that is not fixed. Of a subset that falls, only parts
-                that move are tried.
+            hands: bitset of the parts that can be held; default any that is not fixed. Only parts that move are tried.
 
         Returns:
             `held` is what to hold; if nothing helps, `moving` are the parts that move in one motion or another.
@@ -152,7 +157,7 @@ class SpringStability:
         return contact_forces(self.springs, self.settled(subset, held))
 
     def margin(self, subset: int, held: int = 0) -> float:
-        """The largest tilt of gravity (degrees), in each of four horizontal directions, that a subset bears; 0: none."""
+        """The largest tilt of gravity (degrees) that a subset bears in each of four horizontal directions."""
         if not self.standing(subset, held).stands:
             return 0.0
         return min(self._margin(subset, held, direction) for direction in TILTS)
@@ -268,3 +273,57 @@ class SpringStability:
         mask = np.zeros(len(self.masses) + 1, dtype=bool)
         mask[bits(parts)] = True
         return mask
+
+
+def _neighbours(patches: Sequence[Contact], n: int) -> tuple[list[int], list[int], int]:
+    """Bitsets: for each part those that touch it, and those under it; and those on the table."""
+    touching, supports, on_table = [0] * n, [0] * n, 0
+    for p in patches:
+        if p.b == TABLE:
+            on_table |= 1 << p.a
+            continue
+        touching[p.a] |= 1 << p.b
+        touching[p.b] |= 1 << p.a
+        if p.normal[2] < -_UNDER:  # from a down to b: b carries a
+            supports[p.a] |= 1 << p.b
+        elif p.normal[2] > _UNDER:
+            supports[p.b] |= 1 << p.a
+    return touching, supports, on_table
+
+
+def spring_stability(
+    assembly: Assembly,
+    *,
+    clearance: float = 0.0,
+    gravity: Array = DOWN,
+    numbers: SpringNumbers = DEFAULT_NUMBERS,
+    remember: bool = True,
+) -> SpringStability:
+    """The stability of an assembly by springs.
+
+    Args:
+        clearance: faces that are so far apart (length) at the most touch once the gap has closed. Beyond the touching
+            tolerance, within which faces touch as they are, parts have play: what drops by it and then rests, stands.
+    """
+    rigid = replace(assembly, tolerances=replace(assembly.tolerances, patch_shrink=0.0), _cache={})
+    limit = Stability(rigid)
+    _, centres = masses(assembly)
+    gaps = None
+    if clearance > assembly.touch:
+        wide = replace(assembly.tolerances, touch=clearance / assembly.smallest_extent)
+        near = replace(assembly, tolerances=wide, _cache={})
+        patches = merged_patches(near, find_contacts(near))
+        gaps = np.array([p.gap if p.gap > assembly.touch else 0.0 for p in patches])
+    else:
+        patches = merged_patches(rigid, rigid.contacts())
+    return SpringStability(
+        limit,
+        patches,
+        centres,
+        friction=assembly.friction,
+        fixed=assembly.fixed_mask,
+        gaps=gaps,
+        gravity=gravity,
+        numbers=numbers,
+        remember=remember,
+    )

@@ -52,9 +52,8 @@ class SpringStanding(Standing):
     """Whether a subset stands, by springs.
 
     Attributes:
-        balanced: whether some forces balance the parts (limit analysis). Where it stands they do. Where it falls and they
-            do not, `moving` is a nogood as `Standing` has it; where it falls and they do, it promises nothing.
-        movements: how parts begin to fall, the one that falls most first; asked for by `SpringStability.movements`.
+        balanced: whether some forces balance the parts (limit analysis). Where it falls and none do, `moving` is a
+            nogood as `Standing` has it; where it falls and some do, it promises nothing.
     """
 
     balanced: bool = True
@@ -91,8 +90,8 @@ def moving_parts(settled: Settled) -> int:
 def movements(springs: Springs, settled: Settled) -> list[Movement]:
     """How parts begin to fall, the one that falls most first."""
     pressed = np.zeros(len(springs.weights) + 1)
-    for part in (springs.a, springs.b):
-        np.add.at(pressed, part[settled.corners], settled.forces[:, 0])
+    for ends in (springs.a, springs.b):
+        np.add.at(pressed, ends[settled.corners], settled.forces[:, 0])
     found = []
     least = _MOVES_ALONG * settled.share.max(initial=0.0)
     for k in np.argsort(-settled.share):

@@ -1,10 +1,10 @@
 """Rigid parts on springs: what gravity makes of contacts that only push, and rub no more than they are pressed.
 
-Parts move by small displacements u. At each corner of a contact patch a spring resists compression (never opening), and
+Parts move by small displacements u. At each corner of a contact patch a spring resists compression, never opening, and
 another resists sliding until its force reaches a bound s. For given s the energy is convex in u, and Newton's method
-finds its least value (`neurosym.geometry.stability.settling`). Then s is brought nearer to Coulomb's mu N, from the total
-weight (everything glued) until both agree: forces arise as parts sink into their places, and nothing is clamped by
-a preload that nobody applied. That is what tells it from limit analysis, which asks whether some forces balance.
+finds its least value (`neurosym.geometry.stability.settling`). Then s is brought nearer to Coulomb's mu N, from
+the total weight (everything glued) until both agree: forces arise as parts sink into their places, and nothing is
+clamped by a preload that nobody applied. Limit analysis, which asks whether some forces balance, cannot tell.
 Kao et al., "Coupled rigid-block analysis" (Computer-Aided Design, 2022), couple forces and motions to the same end.
 
 Everything is counted in units of the structure's own: lengths in a part's size, displacements in `softness` times the
@@ -37,7 +37,7 @@ class SpringNumbers:
             the system solvable. A part that falls is carried by nothing else, and goes 1 / ground far; a part that
             stands goes 1 to 1,000.
         falls: a part falls when the ground carries more of its weight than this share. An imbalance of a thousandth
-            of a part's weight, or of its weight times its size, is taken for balance: on the knife's edge a part stands.
+            of a part's weight, or of its weight times its size, is taken for balance: on a knife's edge a part stands.
         agreement: friction may differ from Coulomb's law by this share of a part's weight.
         damping: of the steps of s; they are mixed by Anderson's method, which takes 3 to 10 rounds where plain damped
             steps take 20 to 60 and oscillate in narrow wedges.
@@ -51,6 +51,9 @@ class SpringNumbers:
     agreement: float = 1e-2
     damping: float = 0.5
     patience: int = 3
+
+
+DEFAULT_NUMBERS = SpringNumbers()
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +98,7 @@ class Springs:
         return load
 
     def scaled(self, wrench: Array, part: int) -> Array:
-        """A force and a torque about a part's centre, float64 (6,), masses and lengths as the parts have, in own units."""
+        """A force and a torque about a part's centre, float64 (6,), from the parts' masses and lengths to own units."""
         result: Array = wrench / self.unit
         result[3:] /= self.sizes[part]
         return result
