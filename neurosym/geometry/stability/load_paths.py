@@ -18,7 +18,7 @@ from neurosym.geometry.stability.springs import Array
 from neurosym.support.bitsets import bits
 
 #: A contact is level when its normal is this near to the vertical (sine).
-_LEVEL = 1e-6
+LEVEL = 1e-6
 #: A point within this share of a part's size of the area is on it.
 _ON_EDGE = 1e-9
 
@@ -40,7 +40,7 @@ class LoadPaths:
         self.near = [0] * n
         lower, upper = [], []
         for p in patches:
-            if np.hypot(p.normal[0], p.normal[1]) > _LEVEL:
+            if np.hypot(p.normal[0], p.normal[1]) > LEVEL:
                 continue
             top, bottom = (p.a, p.b) if p.normal[2] < 0 else (p.b, p.a)
             if top == TABLE:
@@ -72,6 +72,21 @@ class LoadPaths:
             return False
         self._carried = there, movable
         return True
+
+    def unproved(self, there: int, movable: int) -> int:
+        """Movable parts that do not hand on every load, and all that lie on these, as a bitset.
+
+        Where these stand by pushes straight down, all others immovable, all movable parts stand.
+        """
+        found = fresh = sum(1 << part for part in bits(movable) if not self.hands_on(part, there))
+        while fresh:
+            above = 0
+            for part in bits(fresh):
+                for top, _ in self.above[part]:
+                    above |= 1 << top
+            fresh = above & movable & ~found
+            found |= fresh
+        return found
 
     def hands_on(self, part: int, there: int) -> bool:
         """Whether a part hands on every load to those below that are there."""

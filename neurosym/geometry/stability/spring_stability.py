@@ -12,7 +12,7 @@ from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.contact.contacts import TABLE, Contact, find_contacts
 from neurosym.geometry.stability.contact_springs import contact_springs
 from neurosym.geometry.stability.holding import parts_to_hold
-from neurosym.geometry.stability.load_paths import LoadPaths
+from neurosym.geometry.stability.load_paths import LEVEL, LoadPaths
 from neurosym.geometry.stability.patches import masses, merged_patches
 from neurosym.geometry.stability.settling import Settled, settle
 from neurosym.geometry.stability.spring_verdicts import (
@@ -43,10 +43,11 @@ class SpringStability:
 
     * loads that go straight down (`LoadPaths`): a proof that all stands, in no time;
     * single parts beside a gap that fall though all others are immovable, by limit analysis: a proof of a fall;
+    * pushes straight down again, of those parts alone that do not simply hand on loads, by springs without friction;
     * springs.
 
-    Where springs let something fall, limit analysis is asked too: where no forces balance the parts, their fall is
-    a promise about smaller subsets.
+    Where springs let something fall, limit analysis is asked about what moves, all else immovable: where no forces
+    balance that, the fall is a promise about smaller subsets.
 
     Args:
         limit: limit analysis of the same parts.
@@ -63,7 +64,7 @@ class SpringStability:
         touching: touching[i] is a bitset of the parts in contact with part i.
         on_table: bitset of the parts in contact with the table.
         supports: supports[i] is a bitset of the parts with a contact under part i (normal within 45 degrees).
-        asked: how groups were judged: {"load paths", "single parts", "springs"} -> how many.
+        asked: how groups were judged: {"load paths", "single parts", "pushes", "springs"} -> how many.
     """
 
     def __init__(
@@ -86,7 +87,7 @@ class SpringStability:
         # Neither proof knows of play, nor of a tilted world.
         straight = bool(np.array_equal(gravity, DOWN)) and not self.springs.gap.any()
         self._paths = LoadPaths(patches, centres) if straight else None
-        self.asked = dict.fromkeys(("load paths", "single parts", "springs"), 0)
+        self.asked = dict.fromkeys(("load paths", "single parts", "pushes", "springs"), 0)
         self._groups: dict[tuple[int, int], SpringStanding] = {}
 
     def standing(self, subset: int, held: int = 0) -> SpringStanding:
@@ -236,15 +237,36 @@ class SpringStability:
             if falls:
                 self.asked["single parts"] += 1
                 return SpringStanding(False, falls, balanced=False)
+            if self._pushes_balance(group, there):
+                self.asked["pushes"] += 1
+                return SpringStanding(True)
         self.asked["springs"] += 1
         settled = self.settled(there, around)
         if settled.stands:
             return SpringStanding(True)
+        moving = moving_parts(settled)
         if self._paths is not None:
-            by_limit = self.limit.standing(there, around)
+            near = self._touching(moving) & there & ~moving
+            by_limit = self.limit.standing(moving | near, near)
             if not by_limit.stands:
                 return SpringStanding(False, by_limit.moving, balanced=False)
-        return SpringStanding(False, moving_parts(settled))
+        return SpringStanding(False, moving)
+
+    def _pushes_balance(self, group: int, there: int) -> bool:
+        """Whether parts that do not hand on every load stand by pushes straight down, and they are the fewer."""
+        assert self._paths is not None
+        open_ = self._paths.unproved(there, group)
+        if not open_:
+            return True
+        if 2 * open_.bit_count() > group.bit_count():
+            return False
+        moving, present = self._mask(open_), self._mask(there)
+        present[-1] = True
+        corners = self.springs.corners_of(present, moving)
+        corners = corners[np.abs(self.springs.axes[corners, 0, 2]) > 1 - LEVEL]
+        smooth = np.ones(len(corners), dtype=bool)
+        load = self.springs.gravity(self.gravity)
+        return settle(self.springs, np.flatnonzero(moving), corners, load, slippery=smooth).stands
 
     def _single_fall(self, group: int, there: int) -> int:
         """A part that has lost a neighbour and falls even if all others cannot move, as a bitset; 0: none."""

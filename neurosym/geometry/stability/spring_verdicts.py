@@ -52,8 +52,8 @@ class SpringStanding(Standing):
     """Whether a subset stands, by springs.
 
     Attributes:
-        balanced: whether some forces balance the parts (limit analysis). Where it falls and none do, `moving` is a
-            nogood as `Standing` has it; where it falls and some do, it promises nothing.
+        balanced: False where limit analysis proves that no forces balance `moving`: a nogood as `Standing` has it.
+            A fall where this is True promises nothing.
     """
 
     balanced: bool = True
