@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from neurosym.geometry.contact.contacts import TABLE, Contact
-from neurosym.geometry.stability.patches import patch_axes
-from neurosym.geometry.stability.springs import DEFAULT_NUMBERS, Array, SpringNumbers, Springs
+from neurosym.geometry.mesh.broad_phase import spans
+from neurosym.geometry.stability.springs import DEFAULT_NUMBERS, Array, Numbers, SpringNumbers, Springs
 
 
 def contact_springs(
@@ -31,15 +30,16 @@ def contact_springs(
         friction: Coulomb's coefficient.
         gaps: float64 (len(patches),): how far the faces of each are apart (length); None: they touch.
     """
-    counts = [len(p.points) for p in patches]
-    patch = np.repeat(np.arange(len(patches)), counts)
+    counts = np.array([len(p.points) for p in patches], dtype=np.int64)
+    patch, place = spans(counts)
     a = np.array([p.a for p in patches], dtype=np.int64)[patch]
     b = np.array([p.b for p in patches], dtype=np.int64)[patch]
     at = np.concatenate([np.zeros((0, 3)), *(p.points for p in patches)])
-    frames = np.array([[-p.normal, *patch_axes(p)] for p in patches]).reshape(-1, 3, 3)
-    axes = frames[patch]
+    following = np.arange(len(at)) + np.where(place + 1 == counts[patch], 1 - counts[patch], 1)
+    normals = np.array([p.normal for p in patches]).reshape(-1, 3)[patch]
     areas = np.array([p.area for p in patches])
-    across = np.concatenate([np.zeros(0), *(p.area * _shares(p) for p in patches)]) / (areas.mean() if counts else 1.0)
+    across = areas[patch] * _shares(at, following, normals, patch) / (areas.mean() if len(areas) else 1.0)
+    axes = _axes(at, following, normals, patch)
     sizes = _sizes(a, b, at, centres)
     weights = masses / masses.mean()
     gap = (np.zeros(len(patches)) if gaps is None else gaps)[patch] / (numbers.softness * sizes.mean())
@@ -62,16 +62,33 @@ def contact_springs(
     )
 
 
-def _shares(patch: Contact) -> Array:
-    """The share of a patch about each corner, float64 (k,): half of the two triangles between it and the middle."""
-    arms = patch.points - patch.points.mean(axis=0)
-    triangles = np.abs(np.cross(arms, np.roll(arms, -1, axis=0)) @ patch.normal)
-    shares = triangles + np.roll(triangles, 1)
-    total = shares.sum()
-    return np.asarray(shares / total if total > 0 else np.full(len(arms), 1 / len(arms)))
+def _shares(at: Array, following: Numbers, normals: Array, patch: Numbers) -> Array:
+    """The share of a patch about each corner, float64 (c,): half of the two triangles between it and the middle."""
+    if not len(at):
+        return np.zeros(0)
+    starts = np.flatnonzero(np.diff(patch, prepend=-1))
+    middles = np.add.reduceat(at, starts) / np.bincount(patch)[:, None]
+    arms = at - middles[patch]
+    triangles = np.abs(np.einsum("cd,cd->c", np.cross(arms, arms[following]), normals))
+    shares = triangles.copy()
+    shares[following] += triangles
+    result: Array = shares / np.add.reduceat(shares, starts)[patch]
+    return result
 
 
-def _sizes(a: NDArray[np.int64], b: NDArray[np.int64], at: Array, centres: Array) -> Array:
+def _axes(at: Array, following: Numbers, normals: Array, patch: Numbers) -> Array:
+    """float64 (c, 3, 3): minus the patch's normal, and tangents along and across its longest edge."""
+    if not len(at):
+        return np.zeros((0, 3, 3))
+    edges = at[following] - at
+    edges -= np.einsum("cd,cd->c", edges, normals)[:, None] * normals
+    order = np.lexsort((-np.linalg.norm(edges, axis=1), patch))
+    longest = order[np.flatnonzero(np.diff(patch[order], prepend=-1))]
+    u = (edges[longest] / np.linalg.norm(edges[longest], axis=1, keepdims=True))[patch]
+    return np.stack([-normals, u, np.cross(normals, u)], axis=1)
+
+
+def _sizes(a: Numbers, b: Numbers, at: Array, centres: Array) -> Array:
     """float64 (n,): distance of each part's farthest corner; parts without one are as large as the mean."""
     sizes = np.zeros(len(centres))
     for part in (a, b):
@@ -82,7 +99,7 @@ def _sizes(a: NDArray[np.int64], b: NDArray[np.int64], at: Array, centres: Array
     return sizes
 
 
-def _pull(axes: Array, at: Array, part: NDArray[np.int64], centres: Array, sizes: Array) -> Array:
+def _pull(axes: Array, at: Array, part: Numbers, centres: Array, sizes: Array) -> Array:
     """float64 (c, 3, 6): how a part's displacement moves its corners along their axes; 0 for the table."""
     arms = (at - centres[part]) / sizes[part][:, None]
     pull = np.concatenate([axes, np.cross(arms[:, None], axes)], axis=2)

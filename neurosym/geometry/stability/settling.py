@@ -122,7 +122,8 @@ class _System:
         graph = csr_array(
             (np.ones(2 * both.sum()), (np.r_[pa[both], pb[both]], np.r_[pb[both], pa[both]])), shape=(m, m)
         )
-        self.parts: Numbers = parts[reverse_cuthill_mckee(graph, symmetric_mode=True)]
+        order = reverse_cuthill_mckee(graph, symmetric_mode=True) if m else np.zeros(0, dtype=np.int64)
+        self.parts: Numbers = parts[order]
         place[self.parts] = np.arange(m)
         self.pa, self.pb = place[springs.a[corners]], place[springs.b[corners]]
         self.Ja, self.Jb = springs.Ja[corners], springs.Jb[corners]

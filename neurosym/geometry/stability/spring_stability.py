@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -23,7 +23,7 @@ from neurosym.geometry.stability.spring_verdicts import (
     movements,
     moving_parts,
 )
-from neurosym.geometry.stability.springs import DEFAULT_NUMBERS, Array, SpringNumbers, Truths
+from neurosym.geometry.stability.springs import DEFAULT_NUMBERS, Array, SpringNumbers, Springs, Truths
 from neurosym.geometry.stability.standing import Stability
 from neurosym.support.bitsets import bits
 
@@ -50,9 +50,9 @@ class SpringStability:
     balance that, the fall is a promise about smaller subsets.
 
     Args:
-        limit: limit analysis of the same parts.
+        masses: float64 (n,), and `centres`, float64 (n, 3): centres of mass.
+        limit: makes the limit analysis of the same parts, when it is first asked.
         patches: contact patches between parts (`merged_patches`).
-        centres: float64 (n, 3): centres of mass.
         friction: Coulomb's coefficient.
         fixed: bitset of the parts that never move.
         gaps: float64 (len(patches),): how far apart the faces of each patch are (length): play, that closes first.
@@ -69,26 +69,39 @@ class SpringStability:
 
     def __init__(
         self,
-        limit: Stability,
         patches: Sequence[Contact],
+        masses: Array,
         centres: Array,
         *,
         friction: float,
+        limit: Callable[[], Stability],
         fixed: int = 0,
         gaps: Array | None = None,
         gravity: Array = DOWN,
         numbers: SpringNumbers = DEFAULT_NUMBERS,
         remember: bool = True,
     ) -> None:
-        self.limit, self.fixed, self.gravity, self.remember = limit, fixed, gravity, remember
-        self.masses = limit.masses
+        self.masses, self.fixed, self.gravity, self.remember = masses, fixed, gravity, remember
         self.touching, self.supports, self.on_table = _neighbours(patches, len(centres))
-        self.springs = contact_springs(patches, limit.masses, centres, friction=friction, gaps=gaps, numbers=numbers)
+        self._make_limit = limit
+        self._make_springs = functools.partial(
+            contact_springs, patches, masses, centres, friction=friction, gaps=gaps, numbers=numbers
+        )
         # Neither proof knows of play, nor of a tilted world.
-        straight = bool(np.array_equal(gravity, DOWN)) and not self.springs.gap.any()
+        straight = bool(np.array_equal(gravity, DOWN)) and (gaps is None or not gaps.any())
         self._paths = LoadPaths(patches, centres) if straight else None
         self.asked = dict.fromkeys(("load paths", "single parts", "pushes", "springs"), 0)
         self._groups: dict[tuple[int, int], SpringStanding] = {}
+
+    @functools.cached_property
+    def limit(self) -> Stability:
+        """Limit analysis of the same parts: whether some forces balance them."""
+        return self._make_limit()
+
+    @functools.cached_property
+    def springs(self) -> Springs:
+        """The springs at all contacts."""
+        return self._make_springs()
 
     def standing(self, subset: int, held: int = 0) -> SpringStanding:
         """Whether the parts in a bitset stand while those in `held` and the fixed parts cannot move."""
@@ -328,8 +341,8 @@ def spring_stability(
             tolerance, within which faces touch as they are, parts have play: what drops by it and then rests, stands.
     """
     rigid = replace(assembly, tolerances=replace(assembly.tolerances, patch_shrink=0.0), _cache={})
-    limit = Stability(rigid)
-    _, centres = masses(assembly)
+    rigid.remember("contacts", assembly.contacts)
+    mass, centres = masses(assembly)
     gaps = None
     if clearance > assembly.touch:
         wide = replace(assembly.tolerances, touch=clearance / assembly.smallest_extent)
@@ -339,10 +352,11 @@ def spring_stability(
     else:
         patches = merged_patches(rigid, rigid.contacts())
     return SpringStability(
-        limit,
         patches,
+        mass,
         centres,
         friction=assembly.friction,
+        limit=lambda: Stability(rigid),
         fixed=assembly.fixed_mask,
         gaps=gaps,
         gravity=gravity,
