@@ -71,9 +71,8 @@ def agreement(subsets: int, seed: int = 1000) -> None:
         for name, answer in answers.items():
             wrong[name][answer.stands] += answer.stands != seen
         if answers["springs"].stands != seen:
-            print(
-                f"  cube {number}, {' '.join(names)}: PyBullet {_word(seen)}, springs {_word(not seen)}{referee(world, names)}"
-            )
+            others = f"PyBullet {_word(seen)}{referee(world, names)}"
+            print(f"  cube {number}, {' '.join(names)}: springs: {_word(not seen)}; {others}")
             for movement in springs.movements(subset)[:1]:
                 print(f"    {movement.sentence(world.names)} {movement.share:.0%} of its weight is not carried.")
     for name, (falls, rests) in wrong.items():
