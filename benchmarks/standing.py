@@ -23,6 +23,7 @@ import numpy as np
 from assembly_scaling import pyramid, wall
 
 import neurosym as ns
+from neurosym.geometry.queries import AssemblyGeometry
 from neurosym.geometry.stability.spring_stability import SpringStability, spring_stability
 from neurosym.simulation.world import stands
 from neurosym.support.bitsets import bits
@@ -43,7 +44,7 @@ def bricks(length: int, height: int) -> ns.Assembly:
 
 def questions(assembly: ns.Assembly) -> list[int]:
     """Bitsets of parts, each what is left after one more removal from the last that stood."""
-    rng, stability = np.random.default_rng(0), assembly.afresh().stability()
+    rng, stability = np.random.default_rng(0), AssemblyGeometry(assembly, tabulate=False).stability
     height = np.array([assembly.body_bounds[assembly.owners == k, 1, 2].max() for k in range(len(assembly))])
     there, asked = (1 << len(assembly)) - 1, []
     while len(asked) < QUESTIONS and there & ~assembly.fixed_mask:
@@ -56,6 +57,10 @@ def questions(assembly: ns.Assembly) -> list[int]:
     return asked
 
 
+def by_springs_of(assembly: ns.Assembly) -> SpringStability:
+    return spring_stability(assembly, AssemblyGeometry(assembly).contacts)
+
+
 def agreement(subsets: int, seed: int = 1000) -> None:
     """Springs and limit analysis against PyBullet."""
     rng, soma = np.random.default_rng(seed), ns.load_domain("soma")
@@ -66,8 +71,11 @@ def agreement(subsets: int, seed: int = 1000) -> None:
         subset = 0b1111111 & ~sum(1 << int(k) for k in gone)
         names = world.in_mask(subset)
         seen = not stands(world, present=names)
-        springs = spring_stability(world)
-        answers = {"springs": springs.standing(subset), "limit analysis": world.stability().standing(subset)}
+        springs = by_springs_of(world)
+        answers = {
+            "springs": springs.standing(subset),
+            "limit analysis": AssemblyGeometry(world).stability.standing(subset),
+        }
         for name, answer in answers.items():
             wrong[name][answer.stands] += answer.stands != seen
         if answers["springs"].stands != seen:
@@ -96,7 +104,8 @@ def _word(stands: bool) -> str:
 def measure(name: str, assembly: ns.Assembly, program: bool = True) -> None:
     """The same questions to springs, limit analysis and linear programs."""
     asked = questions(assembly)
-    springs, quick, slow = spring_stability(assembly), assembly.stability(), assembly.afresh().stability()
+    springs, quick = by_springs_of(assembly), AssemblyGeometry(assembly).stability
+    slow = AssemblyGeometry(assembly, tabulate=False).stability
     springs.standing((1 << len(assembly)) - 1)
     start = time.process_time()
     by_springs = [springs.standing(subset).stands for subset in asked]
@@ -119,9 +128,9 @@ def measure(name: str, assembly: ns.Assembly, program: bool = True) -> None:
 def size(name: str, assembly: ns.Assembly) -> None:
     """How long it takes to judge the whole, what has lost parts from its midst, and each step of taking it down."""
     full, rng = (1 << len(assembly)) - 1, np.random.default_rng(0)
-    assembly.contacts()
+    contacts = AssemblyGeometry(assembly).contacts
     start = time.process_time()
-    springs = spring_stability(assembly)
+    springs = spring_stability(assembly, contacts)
     built = time.process_time() - start
     loose = bits(full & ~assembly.fixed_mask)
     asked = [full & ~sum(1 << int(k) for k in rng.choice(loose, 2, replace=False)) for _ in range(20)]
@@ -131,7 +140,7 @@ def size(name: str, assembly: ns.Assembly) -> None:
     down, order = [], sorted(loose, key=lambda k: -assembly.body_bounds[assembly.owners == k, 1, 2].max())
     for part in order if assembly.fixed_mask == 0 else []:
         down.append(full & ~(1 << part) if not down else down[-1] & ~(1 << part))
-    top = _milliseconds(spring_stability(assembly).standing, down[:-1]) if down else np.zeros(1)
+    top = _milliseconds(spring_stability(assembly, contacts).standing, down[:-1]) if down else np.zeros(1)
     figures = np.median(whole), np.median(alone), np.median(midst), midst.max(), top.mean()
     told = " ".join(f"{x:8.1f}" for x in figures)
     print(f"{name:11} {len(assembly):5} {built:8.2f} {told}   {_counts(springs)}", flush=True)

@@ -8,7 +8,8 @@ import numpy as np
 
 from neurosym.geometry.contact.contacts import TABLE, Contact
 from neurosym.geometry.mesh.broad_phase import spans
-from neurosym.geometry.stability.springs import DEFAULT_NUMBERS, Array, Numbers, SpringNumbers, Springs
+from neurosym.geometry.stability.springs import DEFAULT_NUMBERS, SpringNumbers, Springs
+from neurosym.support.arrays import Array, Numbers
 
 
 def contact_springs(

@@ -14,7 +14,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
 from neurosym.geometry.contact.contacts import TABLE, Contact
-from neurosym.geometry.stability.springs import Array
+from neurosym.support.arrays import Array
 from neurosym.support.bitsets import bits
 
 #: A contact is level when its normal is this near to the vertical (sine).

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from neurosym.geometry.assembly import Assembly
@@ -9,6 +11,9 @@ from neurosym.geometry.contact.contacts import TABLE, Contact, hull_points
 from neurosym.geometry.mesh.topology import volume_and_centre
 from neurosym.geometry.shapes import Box
 from neurosym.support.arrays import Array
+
+#: A part is under another when the normal between them points down by more (45 degrees).
+UNDER = 0.7
 
 
 def patch_axes(patch: Contact) -> tuple[Array, Array]:
@@ -62,3 +67,19 @@ def masses(assembly: Assembly) -> tuple[Array, Array]:
         moments[owner] += volume * centre
     densities = np.array([p.density for p in assembly.parts])
     return volumes * densities, moments / volumes[:, None]
+
+
+def neighbours(patches: Iterable[Contact], n: int) -> tuple[list[int], list[int], int]:
+    """Of n parts, as bitsets: for each those that touch it, and those under it; and those on the table."""
+    touching, supports, on_table = [0] * n, [0] * n, 0
+    for p in patches:
+        if p.b == TABLE:
+            on_table |= 1 << p.a
+            continue
+        touching[p.a] |= 1 << p.b
+        touching[p.b] |= 1 << p.a
+        if p.normal[2] < -UNDER:  # from a down to b: b carries a
+            supports[p.a] |= 1 << p.b
+        elif p.normal[2] > UNDER:
+            supports[p.b] |= 1 << p.a
+    return touching, supports, on_table

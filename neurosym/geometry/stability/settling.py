@@ -10,7 +10,8 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from neurosym.geometry.stability import spring_kernels as kernels
-from neurosym.geometry.stability.springs import Array, Numbers, Springs, Truths
+from neurosym.geometry.stability.springs import Springs
+from neurosym.support.arrays import Array, Numbers, Truths
 
 #: Newton's steps in a round while nothing falls: the bounds are about to change. What falls is followed to the end.
 _STEPS, _MOST_STEPS = 3, 200

@@ -7,12 +7,9 @@ tangent); `pa`, `pb` int64 (c,) are places of its parts in the system, -1 for wh
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from neurosym.support.arrays import Array, Numbers
 from neurosym.support.compiled import compiled
-
-Array = NDArray[np.float64]
-Numbers = NDArray[np.int64]
 
 
 @compiled

@@ -9,11 +9,12 @@ from dataclasses import replace
 import numpy as np
 
 from neurosym.geometry.assembly import Assembly
-from neurosym.geometry.contact.contacts import TABLE, Contact, find_contacts
+from neurosym.geometry.contact.contacts import Contact, find_contacts
+from neurosym.geometry.contact.surfaces import BodySurfaces
 from neurosym.geometry.stability.contact_springs import contact_springs
 from neurosym.geometry.stability.holding import parts_to_hold
 from neurosym.geometry.stability.load_paths import LEVEL, LoadPaths
-from neurosym.geometry.stability.patches import masses, merged_patches
+from neurosym.geometry.stability.patches import masses, merged_patches, neighbours
 from neurosym.geometry.stability.settling import Settled, settle
 from neurosym.geometry.stability.spring_verdicts import (
     ContactForces,
@@ -23,17 +24,13 @@ from neurosym.geometry.stability.spring_verdicts import (
     movements,
     moving_parts,
 )
-from neurosym.geometry.stability.springs import DEFAULT_NUMBERS, Array, SpringNumbers, Springs, Truths
+from neurosym.geometry.stability.springs import DEFAULT_NUMBERS, SpringNumbers, Springs
 from neurosym.geometry.stability.standing import Stability
+from neurosym.support.arrays import Array, Truths
 from neurosym.support.bitsets import bits
 
-#: Gravity, and the horizontal directions in which `SpringStability.margin` tilts it.
+#: Gravity.
 DOWN = np.array([0.0, 0.0, -1.0])
-TILTS = np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -1.0, 0.0]])
-#: Of a normal: a part is under another when it points down by more (45 degrees).
-_UNDER = 0.7
-#: Halvings of the angle of tilt, from 90 degrees: to 0.2 degrees.
-_HALVINGS = 9
 
 
 class SpringStability:
@@ -82,7 +79,7 @@ class SpringStability:
         remember: bool = True,
     ) -> None:
         self.masses, self.fixed, self.gravity, self.remember = masses, fixed, gravity, remember
-        self.touching, self.supports, self.on_table = _neighbours(patches, len(centres))
+        self.touching, self.supports, self.on_table = neighbours(patches, len(centres))
         self._make_limit = limit
         self._make_springs = functools.partial(
             contact_springs, patches, masses, centres, friction=friction, gaps=gaps, numbers=numbers
@@ -170,12 +167,6 @@ class SpringStability:
         """The forces at contacts in which a subset comes to rest."""
         return contact_forces(self.springs, self.settled(subset, held))
 
-    def margin(self, subset: int, held: int = 0) -> float:
-        """The largest tilt of gravity (degrees) that a subset bears in each of four horizontal directions."""
-        if not self.standing(subset, held).stands:
-            return 0.0
-        return min(self._margin(subset, held, direction) for direction in TILTS)
-
     # -- loads ------------------------------------------------------------------------------------------------
 
     def settled(
@@ -204,34 +195,6 @@ class SpringStability:
         smooth = self._mask(slippery)
         rubs_not = smooth[self.springs.a[corners]] | smooth[self.springs.b[corners]]
         return settle(self.springs, np.flatnonzero(moving), corners, load, slippery=rubs_not)
-
-    def standing_while_pulled(self, subset: int, part: int, direction: Array, held: int = 0) -> SpringStanding:
-        """Whether a subset stands as one of its parts begins to be drawn along a direction (3,).
-
-        What touches the part is dragged along with mu times the force that presses the two. The part itself goes
-        where it is drawn: it still carries what lies on it, but holds nothing by friction.
-        """
-        loads = self.drag(subset, part, direction, held)
-        settled = self.settled(subset, held | 1 << part, loads=loads, slippery=1 << part)
-        return SpringStanding(settled.stands, 0 if settled.stands else moving_parts(settled), held)
-
-    def drag(self, subset: int, part: int, direction: Array, held: int = 0) -> dict[int, Array]:
-        """The force and torque, float64 (6,), on each part that one touches as it is drawn along a direction (3,)."""
-        springs, settled = self.springs, self.settled(subset, held)
-        way = np.asarray(direction, dtype=np.float64) / np.linalg.norm(direction)
-        loads: dict[int, Array] = {}
-        for k, corner in enumerate(settled.corners):
-            pair = int(springs.a[corner]), int(springs.b[corner])
-            other = pair[0] if pair[1] == part else pair[1]
-            if part not in pair or other < 0 or settled.forces[k, 0] <= 0:
-                continue
-            along = way - (way @ springs.axes[corner, 0]) * springs.axes[corner, 0]
-            size = float(np.linalg.norm(along))
-            if size > 1e-9:
-                force = springs.unit * springs.friction * settled.forces[k, 0] * along / size
-                torque = np.cross(springs.at[corner] - springs.centres[other], force)
-                loads[other] = loads.get(other, np.zeros(6)) + np.concatenate([force, torque])
-        return loads
 
     # -- one group --------------------------------------------------------------------------------------------
 
@@ -291,15 +254,6 @@ class SpringStability:
                     return 1 << part
         return 0
 
-    def _margin(self, subset: int, held: int, direction: Array) -> float:
-        low, high = 0.0, 90.0
-        for _ in range(_HALVINGS):
-            tilt = np.radians((low + high) / 2)
-            gravity = np.cos(tilt) * self.gravity + np.sin(tilt) * direction
-            stands = self.settled(subset, held, gravity=gravity).stands
-            low, high = ((low + high) / 2, high) if stands else (low, (low + high) / 2)
-        return low
-
     def _touching(self, parts: int) -> int:
         return functools.reduce(int.__or__, (self.touching[p] for p in bits(parts)), 0)
 
@@ -310,53 +264,38 @@ class SpringStability:
         return mask
 
 
-def _neighbours(patches: Sequence[Contact], n: int) -> tuple[list[int], list[int], int]:
-    """Bitsets: for each part those that touch it, and those under it; and those on the table."""
-    touching, supports, on_table = [0] * n, [0] * n, 0
-    for p in patches:
-        if p.b == TABLE:
-            on_table |= 1 << p.a
-            continue
-        touching[p.a] |= 1 << p.b
-        touching[p.b] |= 1 << p.a
-        if p.normal[2] < -_UNDER:  # from a down to b: b carries a
-            supports[p.a] |= 1 << p.b
-        elif p.normal[2] > _UNDER:
-            supports[p.b] |= 1 << p.a
-    return touching, supports, on_table
-
-
 def spring_stability(
     assembly: Assembly,
+    contacts: tuple[Contact, ...],
     *,
     clearance: float = 0.0,
     gravity: Array = DOWN,
     numbers: SpringNumbers = DEFAULT_NUMBERS,
     remember: bool = True,
 ) -> SpringStability:
-    """The stability of an assembly by springs.
+    """The stability of an assembly with these contacts, by springs.
 
     Args:
         clearance: faces that are so far apart (length) at the most touch once the gap has closed. Beyond the touching
             tolerance, within which faces touch as they are, parts have play: what drops by it and then rests, stands.
     """
-    rigid = replace(assembly, tolerances=replace(assembly.tolerances, patch_shrink=0.0), _cache={})
-    rigid.remember("contacts", assembly.contacts)
-    mass, centres = masses(assembly)
-    gaps = None
+    # No patch is shrunk: limit analysis is to refute only what no forces can hold.
+    exact = replace(assembly, tolerances=replace(assembly.tolerances, patch_shrink=0.0))
+    near, gaps = exact, None
     if clearance > assembly.touch:
         wide = replace(assembly.tolerances, touch=clearance / assembly.smallest_extent)
-        near = replace(assembly, tolerances=wide, _cache={})
-        patches = merged_patches(near, find_contacts(near))
+        near = replace(assembly, tolerances=wide)
+        patches = merged_patches(near, find_contacts(near, BodySurfaces(near.bodies)))
         gaps = np.array([p.gap if p.gap > assembly.touch else 0.0 for p in patches])
     else:
-        patches = merged_patches(rigid, rigid.contacts())
+        patches = merged_patches(exact, contacts)
+    mass, centres = masses(assembly)
     return SpringStability(
         patches,
         mass,
         centres,
         friction=assembly.friction,
-        limit=lambda: Stability(rigid),
+        limit=functools.partial(Stability, exact, contacts, remember=remember),
         fixed=assembly.fixed_mask,
         gaps=gaps,
         gravity=gravity,

@@ -8,9 +8,10 @@ from typing import Literal
 
 import numpy as np
 
+from neurosym.geometry.stability.holding import Standing
 from neurosym.geometry.stability.settling import Settled
-from neurosym.geometry.stability.springs import Array, Springs
-from neurosym.geometry.stability.standing import Standing
+from neurosym.geometry.stability.springs import Springs
+from neurosym.support.arrays import Array, Numbers
 from neurosym.support.words import joined
 
 #: A part moves with those that fall when the ground carries this share of what it carries of the part that falls most.
@@ -74,8 +75,8 @@ class ContactForces:
         slipping: float64 (k,): 0 where there is no friction, 1 where it slips.
     """
 
-    a: np.ndarray[tuple[int], np.dtype[np.int64]]
-    b: np.ndarray[tuple[int], np.dtype[np.int64]]
+    a: Numbers
+    b: Numbers
     points: Array
     forces: Array
     slipping: Array

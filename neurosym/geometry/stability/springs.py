@@ -16,11 +16,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Numbers = NDArray[np.int64]
-Truths = NDArray[np.bool_]
+from neurosym.support.arrays import Array, Numbers, Truths
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ from neurosym.geometry.contact.contacts import TABLE, Contact
 from neurosym.geometry.stability.equilibrium import BALANCE, CONE_EDGES, QUICK, THOROUGH, Balance, Equilibrium
 from neurosym.geometry.stability.holding import Standing, parts_to_hold
 from neurosym.geometry.stability.linear_program import solve_program
-from neurosym.geometry.stability.patches import masses, merged_patches
+from neurosym.geometry.stability.patches import masses, merged_patches, neighbours
 from neurosym.support.arrays import Array, Numbers, Truths
 from neurosym.support.bitsets import bits
 
@@ -66,20 +66,9 @@ class Stability:
 
     def __init__(self, assembly: Assembly, contacts: tuple[Contact, ...], *, remember: bool = True) -> None:
         self.assembly, self.remember = assembly, remember
-        n = len(assembly)
         self.masses, self._centres = masses(assembly)
         patches = merged_patches(assembly, contacts)
-        self.touching, self.supports, self.on_table = [0] * n, [0] * n, 0
-        for p in patches:
-            if p.b == TABLE:
-                self.on_table |= 1 << p.a
-                continue
-            self.touching[p.a] |= 1 << p.b
-            self.touching[p.b] |= 1 << p.a
-            if p.normal[2] < -0.7:  # from a down to b: b carries a
-                self.supports[p.a] |= 1 << p.b
-            elif p.normal[2] > 0.7:
-                self.supports[p.b] |= 1 << p.a
+        self.touching, self.supports, self.on_table = neighbours(patches, len(assembly))
         self.equilibrium = Equilibrium(assembly, patches, self.masses, self._centres)
         self.asked = dict.fromkeys(("kept", "near", "whole", "program"), 0)
         self._answers: dict[tuple[int, int], Standing] = {}
