@@ -13,18 +13,15 @@ import typer
 
 from neurosym import __version__
 from neurosym.commands.compare import compare
-from neurosym.commands.count import count
+from neurosym.commands.doctor import doctor, names
 from neurosym.commands.exit_codes import BAD_INPUT, EXIT_CODES, INTERRUPTED
-from neurosym.commands.export import export
-from neurosym.commands.inspect import inspect
+from neurosym.commands.inspect import count, export, inspect
 from neurosym.commands.learn import demos, train
 from neurosym.commands.plan import plan
 from neurosym.commands.render import render
 from neurosym.commands.replay import replay
-from neurosym.commands.reproduce import reproduce
-from neurosym.commands.results import results
+from neurosym.commands.reproduce import reproduce, results
 from neurosym.commands.spread import spread
-from neurosym.commands.survey import doctor, names
 from neurosym.commands.view import view
 from neurosym.errors import NeurosymError
 

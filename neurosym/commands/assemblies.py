@@ -41,13 +41,12 @@ class FileOptions:
     """How an assembly's files are read, where they leave it open."""
 
     units: Annotated[
-        str | None, typer.Option("--units", metavar="U", help="What a length of 1 is in the files: mm, m, in, ...")
+        str | None, typer.Option(metavar="U", help="What a length of 1 is in the files: mm, m, in, ...")
     ] = None
-    up: Annotated[Up | None, typer.Option("--up", help="What is up in the files; default z, in glTF y.")] = None
+    up: Annotated[Up | None, typer.Option(help="What is up in the files; default z, in glTF y.")] = None
     touch: Annotated[
         float | None,
         typer.Option(
-            "--touch",
             metavar="SHARE",
             min=1e-6,
             max=0.5,
@@ -56,14 +55,12 @@ class FileOptions:
         ),
     ] = None
     friction: Annotated[
-        float | None, typer.Option("--friction", metavar="MU", min=0.0, help="Coulomb's coefficient; default 0.5.")
+        float | None, typer.Option(metavar="MU", min=0.0, help="Coulomb's coefficient; default 0.5.")
     ] = None
     puzzle: Annotated[
-        int | None, typer.Option("--puzzle", metavar="N", min=1, help="Which problem of a puzzle's file; default 1.")
+        int | None, typer.Option(metavar="N", min=1, help="Which problem of a puzzle's file; default 1.")
     ] = None
-    solution: Annotated[
-        int | None, typer.Option("--solution", metavar="N", min=1, help="Which of its solutions; default 1.")
-    ] = None
+    solution: Annotated[int | None, typer.Option(metavar="N", min=1, help="Which of its solutions; default 1.")] = None
 
     def reading(self) -> Reading:
         """As the library takes them."""
@@ -77,13 +74,10 @@ class RemovalOptions:
     """How an assembly may be taken apart."""
 
     directions: Annotated[
-        str | None,
-        typer.Option(
-            "--directions", metavar="D", help="Straight ways out: +z,-x or axes (default), contacts, a number."
-        ),
+        str | None, typer.Option(metavar="D", help="Straight ways out: +z,-x or axes (default), contacts, a number.")
     ] = None
     paths: Annotated[
-        Paths | None, typer.Option("--paths", help="Straight lines only (default), or any path where none is free.")
+        Paths | None, typer.Option(help="Straight lines only (default), or any path where none is free.")
     ] = None
     groups: Annotated[
         bool | None, typer.Option("--groups", help="Let several parts leave together, and come apart later.")
@@ -91,12 +85,8 @@ class RemovalOptions:
     gravity: Annotated[
         bool | None, typer.Option("--gravity/--no-gravity", help="Whether what stays must stand by itself (default).")
     ] = None
-    held: Annotated[
-        int | None, typer.Option("--held", metavar="K", help="Parts that may be held meanwhile; default 0.")
-    ] = None
-    fixed: Annotated[
-        list[str] | None, typer.Option("--fixed", metavar="NAME", help="A part that stays. May be repeated.")
-    ] = None
+    held: Annotated[int | None, typer.Option(metavar="K", help="Parts that may be held meanwhile; default 0.")] = None
+    fixed: Annotated[list[str] | None, typer.Option(metavar="NAME", help="A part that stays. May be repeated.")] = None
 
     def given(self) -> dict[str, Any]:
         """Those that were given, as `problem` of the domain "assembly" takes them."""

@@ -7,6 +7,7 @@ import json
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -19,6 +20,8 @@ from neurosym.support.files import write_text
 
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
+    from rich.progress import Progress as Bars
+
 
 class Oracle(StrEnum):
     """What answers attempts."""
@@ -36,25 +39,84 @@ class Pictures(StrEnum):
 
 DomainName = Annotated[str, typer.Argument(metavar="DOMAIN", help="Problem family; `neurosym list` names them.")]
 PriorNames = Annotated[
-    list[str] | None,
-    typer.Option("--prior", metavar="Q", help="Name of a prior, a weights file, or `none`. May be repeated."),
+    list[str] | None, typer.Option(metavar="Q", help="Name of a prior, a weights file, or `none`. May be repeated.")
 ]
 CollapseRule = Annotated[
-    str | None, typer.Option("--collapse", metavar="RULE", help="Rule of collapse (soma: cubes, strict, rigid).")
+    str | None, typer.Option(metavar="RULE", help="Rule of collapse (soma: cubes, strict, rigid).")
 ]
-OracleName = Annotated[Oracle, typer.Option("--oracle", help="What answers attempts.")]
-PictureStyle = Annotated[Pictures, typer.Option("--pictures", help="Style of the pictures.")]
-Split = Annotated[int, typer.Option("--split", min=0, metavar="S", help="Which random split into train and test.")]
+OracleName = Annotated[Oracle, typer.Option(help="What answers attempts.")]
+PictureStyle = Annotated[Pictures, typer.Option(help="Style of the pictures.")]
+Split = Annotated[int, typer.Option(min=0, metavar="S", help="Which random split into train and test.")]
 FamilyOptions = Annotated[
-    list[str] | None,
-    typer.Option("--option", metavar="KEY=VALUE", help="An option of the family's problems. May be repeated."),
-]
-# The help is rich's markup, in which a bracket that is meant as one is escaped.
-Cells = Annotated[
-    Path | None,
-    typer.Option("--cells", metavar="FILE", help='A puzzle of yours: JSON {"name": [\\[x,y,z], ...]}.'),
+    list[str] | None, typer.Option(metavar="KEY=VALUE", help="An option of the family's problems. May be repeated.")
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object to stdout, and nothing else.")]
+
+
+@dataclass(frozen=True)
+class SearchOptions:
+    """What is planned and what with: the options that `plan` and `view` share."""
+
+    # The help is rich's markup, in which a bracket that is meant as one is escaped.
+    cells: Annotated[
+        Path | None, typer.Option(metavar="FILE", help='A puzzle of yours: JSON {"name": [\\[x,y,z], ...]}.')
+    ] = None
+    prior: Annotated[
+        str | None,
+        typer.Option(
+            metavar="Q",
+            help="Name of a prior, a weights file, or `none`. Default none; for an assembly outermost-first.",
+        ),
+    ] = None
+    option: FamilyOptions = None
+    collapse: CollapseRule = None
+    before: Annotated[
+        list[str] | None, typer.Option(metavar="A,B", help="A must come before B. May be repeated.")
+    ] = None
+    removed: Annotated[list[str] | None, typer.Option(metavar="V", help="Is gone already. May be repeated.")] = None
+    oracle: OracleName = Oracle.geometry
+    seed: Annotated[int, typer.Option(min=0, help="Breaks ties; the same seed gives the same plan.")] = 0
+    seconds: Annotated[float | None, typer.Option(help="Budget: wall-clock time.")] = None
+    attempts: Annotated[int | None, typer.Option(help="Budget: questions to the oracle.")] = None
+
+    def of_problem(self) -> dict[str, Any]:
+        """Options of the problem by name; None where one was not given."""
+        before = [pair_of(text) for text in self.before] if self.before else None
+        return {"collapse": self.collapse, "before": before, "removed": self.removed or None}
+
+    def own_cells(self) -> dict[str, Any] | None:
+        """The user's puzzle, {name: [[x, y, z], ...]}, if there is one.
+
+        Raises:
+            InputError: a file that has none.
+        """
+        if self.cells is None:
+            return None
+        expected = f'Expected JSON {{"name": [[x, y, z], ...]}} in {self.cells}; got'
+        try:
+            given = json.loads(self.cells.read_text(encoding="utf-8"), object_pairs_hook=_each_once)
+        except ValueError as error:
+            raise InputError(f"{expected}: {error}.") from None
+        if not isinstance(given, dict) or not all(isinstance(own, list) for own in given.values()):
+            raise InputError(f"{expected} something else.")
+        return given
+
+
+def pair_of(text: str) -> tuple[str, str]:
+    """The two names of ``A,B``."""
+    names = [name.strip() for name in text.split(",")]
+    if len(names) != 2 or not all(names):
+        raise InputError(f"Expected --before A,B: two names with a comma between; got {text!r}.")
+    return names[0], names[1]
+
+
+def _each_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """A JSON object whose keys differ: of two pieces of one name, JSON itself would silently drop the first."""
+    names = [key for key, _ in pairs]
+    twice = sorted({n for n in names if names.count(n) > 1})
+    if twice:
+        raise ValueError(f"{', '.join(twice)} comes twice")
+    return dict(pairs)
 
 
 def say(text: str) -> None:
@@ -76,28 +138,23 @@ def problem_options(family: ProblemFamily, **wanted: Any) -> dict[str, Any]:
 
     An option that was asked for is passed on even if the family does not take it, so that it is refused by name.
     """
-    taken = inspect.signature(family.problem).parameters
-    found = {}
-    for name, value in wanted.items():
-        if value is not None:
-            found[name] = value
-        elif name in taken and taken[name].default is not inspect.Parameter.empty:
-            found[name] = taken[name].default
-    return found
+    defaults = {name: p.default for name, p in inspect.signature(family.problem).parameters.items()}
+    options = {name: defaults.get(name, inspect.Parameter.empty) if v is None else v for name, v in wanted.items()}
+    return {name: value for name, value in options.items() if value is not inspect.Parameter.empty}
 
 
 def family_options(given: Sequence[str] | None) -> dict[str, Any]:
     """``KEY=VALUE`` as the family's own options: a value that is JSON (a number, true, a list) is read as such."""
-    found: dict[str, Any] = {}
+    options: dict[str, Any] = {}
     for text in given or ():
         key, equals, value = text.partition("=")
         if not equals or not key.isidentifier():
             raise InputError(f"Expected an option as KEY=VALUE, for instance variant=unique; got {text!r}.")
         try:
-            found[key] = json.loads(value)
+            options[key] = json.loads(value)
         except ValueError:
-            found[key] = value
-    return found
+            options[key] = value
+    return options
 
 
 def taken_by(function: Callable[..., Any], options: Mapping[str, Any]) -> dict[str, Any]:
@@ -108,18 +165,21 @@ def taken_by(function: Callable[..., Any], options: Mapping[str, Any]) -> dict[s
 @contextmanager
 def progress_bar(what: str) -> Iterator[Progress]:
     """A bar on stderr that goes away when it is done; nothing where stderr is no terminal."""
+    with progress_bars(transient=True) as bars:
+        task = bars.add_task(what, total=None)
+        yield lambda done, total: bars.update(task, completed=done, total=total)
+
+
+def progress_bars(*, transient: bool) -> Bars:
+    """Bars on stderr, which go away when they are done if they are `transient`; none where stderr is no terminal."""
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
     from rich.progress import Progress as Bars
 
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    columns = (BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(), TextColumn("{task.description}"))
     err = Console(stderr=True)
     # The time left is judged by the last hour: a training may take minutes.
-    with Bars(
-        *columns, console=err, transient=True, disable=not err.is_terminal, speed_estimate_period=3600
-    ) as bars:
-        task = bars.add_task(what, total=None)
-        yield lambda done, total: bars.update(task, completed=done, total=total)
+    return Bars(*columns, console=err, transient=transient, disable=not err.is_terminal, speed_estimate_period=3600)
 
 
 def print_json(given: Any) -> None:

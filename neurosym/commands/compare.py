@@ -44,25 +44,21 @@ PARTS = ("test", "train", "all")
 def compare(
     domain: DomainName,
     problems: Annotated[
-        str, typer.Option("--problems", metavar="test|train|all|N", help="Which; N means the first N of the test part.")
+        str, typer.Option(metavar="test|train|all|N", help="Which; N means the first N of the test part.")
     ] = "test",
     split: Split = 0,
     pictures: PictureStyle = Pictures.clean,
-    planner: Annotated[
-        list[str] | None, typer.Option("--planner", metavar="P", help="Name of a planner. May be repeated.")
-    ] = None,
+    planner: Annotated[list[str] | None, typer.Option(metavar="P", help="Name of a planner. May be repeated.")] = None,
     prior: PriorNames = None,
     collapse: CollapseRule = None,
     option: FamilyOptions = None,
     oracle: OracleName = Oracle.geometry,
-    seeds: Annotated[int, typer.Option("--seeds", min=1, metavar="K", help="Solve each problem K times.")] = 1,
+    seeds: Annotated[int, typer.Option(min=1, metavar="K", help="Solve each problem K times.")] = 1,
     out: Annotated[
-        Path | None, typer.Option("--out", metavar="DIR", help="Folder for the table, the figure and the journal.")
+        Path | None, typer.Option(metavar="DIR", help="Folder for the table, the figure and the journal.")
     ] = None,
     as_json: AsJson = False,
-    workers: Annotated[
-        int | None, typer.Option("--workers", min=1, metavar="N", help="Processes; default one a core.")
-    ] = None,
+    workers: Annotated[int | None, typer.Option(min=1, metavar="N", help="Processes; default one a core.")] = None,
 ) -> None:
     """Compare planners and priors on a domain's problems: one row a planner and prior.
 

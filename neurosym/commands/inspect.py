@@ -1,27 +1,29 @@
-"""`neurosym inspect`: an assembly as it was understood, before any plan."""
+"""`neurosym inspect`, `count` and `export`: an assembly as it was understood, before any plan."""
 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
 
 from neurosym.commands.assemblies import AssemblyPath, FileOptions, Paths, RemovalOptions, problem_at
 from neurosym.commands.common import AsJson, print_json
+from neurosym.errors import InputError
 
 if TYPE_CHECKING:
     from neurosym.language.problem import Problem
     from neurosym.planning.inspection import Inspection
 
-#: Lines of one kind that are shown; --json has all.
-SHOWN = 40
+#: Lines of one kind that are printed; --json has all.
+MOST_LINES = 40
+
+#: Default limits: a minute, and as many states as fit into a few hundred megabytes.
+SECONDS, EXPANSIONS = 60.0, 1_000_000
 
 
-def inspect(
-    path: AssemblyPath,
-    files: FileOptions,
-    removal: RemovalOptions,
-    as_json: AsJson = False,
-) -> None:
+def inspect(path: AssemblyPath, files: FileOptions, removal: RemovalOptions, as_json: AsJson = False) -> None:
     """Say what an assembly is: parts, volumes, contacts, what is free, what is interlocked and why, if it stands.
 
     Free and interlocked are meant for straight lines. With --paths any, and parts that are all made of cells, the
@@ -30,15 +32,91 @@ def inspect(
     from neurosym.planning.inspection import inspect_problem
 
     problem = problem_at(path, files, replace(removal, paths=None).given())
-    found = inspect_problem(problem)
+    inspection = inspect_problem(problem)
     level = _level(problem) if removal.paths is Paths.any else None
     if as_json:
-        said = {"path": str(path), "units": problem.world.units, **found.as_json()}
-        print_json(said if removal.paths is not Paths.any else {**said, "level": level})
+        answer = {"path": str(path), "units": problem.world.units, **inspection.as_json()}
+        print_json(answer if removal.paths is not Paths.any else {**answer, "level": level})
         return
-    _show(problem, found)
+    _show(problem, inspection)
     if removal.paths is Paths.any:
         print("No level is known: no moves of groups separate it." if level is None else f"Level {level}.")
+
+
+def count(
+    path: AssemblyPath,
+    files: FileOptions,
+    removal: RemovalOptions,
+    seconds: Annotated[float, typer.Option(help="Budget: wall-clock time.")] = SECONDS,
+    expansions: Annotated[int, typer.Option(help="Budget: states looked at.")] = EXPANSIONS,
+    as_json: AsJson = False,
+) -> None:
+    """Count the orders in which everything that is not fixed can be taken out: exactly, by dynamic programming.
+
+    Where the budget ends first there is no number, and the exit code says so.
+    """
+    from neurosym.pipeline import count_orders
+    from neurosym.planning.budget import Budget
+    from neurosym.planning.result import Status
+
+    problem = problem_at(path, files, removal.given())
+    counted = count_orders(problem, budget=Budget(seconds=seconds, expansions=expansions))
+    if as_json:
+        print_json({"path": str(path), **counted.as_json()})
+    elif counted.orders is None:
+        looked = f"{counted.states:,} states in {counted.seconds:.1f} s"
+        print(f"The budget ended after {looked}, so there is no number. Give more: --seconds, --expansions.")
+    else:
+        least = "" if counted.exact else "At least "
+        print(f"{least}{counted.orders:,} orders ({counted.states:,} states, {counted.seconds:.2f} s)")
+    if counted.orders is None:
+        raise typer.Exit(Status.OUT_OF_BUDGET.exit_code)
+    if not counted.exact:
+        raise typer.Exit(Status.GAVE_UP.exit_code)
+
+
+def export(
+    path: AssemblyPath,
+    *,
+    pddl: Annotated[Path | None, typer.Option(metavar="DIR", help="Write domain.pddl and problem.pddl there.")] = None,
+    graph: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="What blocks and touches what: .graphml, .dot or .json.")
+    ] = None,
+    files: FileOptions,
+    removal: RemovalOptions,
+    seconds: Annotated[float, typer.Option(help="With --pddl: time to look for all that can fall.")] = SECONDS,
+    as_json: AsJson = False,
+) -> None:
+    """Write what the geometry found as PDDL for classical planners, or as a graph.
+
+    With gravity, the PDDL lists what falls without what. Where the time ends before the list is known to be whole, the
+    command and the file say so: then a planner's plan should be replayed.
+    """
+    if pddl is None and graph is None:
+        raise InputError("Expected --pddl DIR or --graph FILE, or both; got neither.")
+    if pddl is not None and pddl.exists() and not pddl.is_dir():
+        raise InputError(f"Expected --pddl to be a folder; {pddl} is a file.")
+    problem = problem_at(path, files, removal.given())
+    written: list[Path] = []
+    facts: dict[str, Any] = {}
+    if graph is not None:
+        from neurosym.geometry.blocking.export import assembly_graph, write_graph
+
+        geometry = problem.geometry
+        assert geometry is not None
+        write_graph(assembly_graph(geometry.blocking(problem.details["directions"]), geometry.contacts), graph)
+        written.append(graph)
+    if pddl is not None:
+        from neurosym.pddl.export import as_pddl
+
+        task = as_pddl(problem, seconds=seconds)
+        written += task.write(pddl)
+        facts = {"sound": task.sound, "notes": list(task.notes), "actions": dict(task.actions)}
+    if as_json:
+        print_json({"written": [str(file) for file in written], **facts})
+    else:
+        for line in (*written, *facts.get("notes", ())):
+            print(line)
 
 
 def _level(problem: Problem) -> int | None:
@@ -50,36 +128,37 @@ def _level(problem: Problem) -> int | None:
     if geometry is None or geometry.cells is None or len(world) < 2:
         return None
     ground = world.ground if world.has_table else None
-    found = first_separation(geometry.cells, (1 << len(world)) - 1, fixed=world.fixed_mask, ground=ground)
-    return found.level if isinstance(found, Separation) else None
+    first = first_separation(geometry.cells, (1 << len(world)) - 1, fixed=world.fixed_mask, ground=ground)
+    return first.level if isinstance(first, Separation) else None
 
 
-def _show(problem: Problem, found: Inspection) -> None:
+def _show(problem: Problem, inspection: Inspection) -> None:
     unit = problem.world.units or "units"
-    print(f"{problem.name}: {len(found.parts)} parts, {len(found.contacts)} pairs in contact; lengths in {unit}")
-    _lines([f"{p.name}: volume {p.volume:.4g}{', fixed' if p.fixed else ''}" for p in found.parts], "parts")
+    counts = f"{len(inspection.parts)} parts, {len(inspection.contacts)} pairs in contact"
+    print(f"{problem.name}: {counts}; lengths in {unit}")
+    _lines([f"{p.name}: volume {p.volume:.4g}{', fixed' if p.fixed else ''}" for p in inspection.parts], "parts")
     print("Contacts:")
-    _lines([f"{c.a} and {c.b}: area {c.area:.4g}" for c in found.contacts], "contacts")
-    print("Free along a straight line:" if found.free else "No part is free along a straight line.")
-    _lines([f"{name}: {', '.join(ways)}" for name, ways in found.free_along.items()], "parts")
-    if found.why is None:
+    _lines([f"{c.a} and {c.b}: area {c.area:.4g}" for c in inspection.contacts], "contacts")
+    print("Free along a straight line:" if inspection.free else "No part is free along a straight line.")
+    _lines([f"{name}: {', '.join(ways)}" for name, ways in inspection.free_along.items()], "parts")
+    if inspection.why is None:
         print("Nothing is interlocked: along straight lines all that is not fixed comes apart, gravity aside.")
     else:
-        print(f"Interlocked: {', '.join(found.interlocked)}.")
-        _lines(list(found.why.sentences), "reasons")
+        print(f"Interlocked: {', '.join(inspection.interlocked)}.")
+        _lines(list(inspection.why.sentences), "reasons")
     if not problem.details["gravity"]:
         print("Without gravity nothing falls.")
-    elif found.stands:
-        print(f"It stands{f' while {chr(44).join(found.held)} are held' if found.held else ''}.")
+    elif inspection.stands:
+        print(f"It stands{f' while {chr(44).join(inspection.held)} are held' if inspection.held else ''}.")
     else:
-        print(f"It does not stand: {', '.join(found.falls)} would fall.")
-    if found.notes:
+        print(f"It does not stand: {', '.join(inspection.falls)} would fall.")
+    if inspection.notes:
         print("Loading:")
-        _lines(list(found.notes), "notes")
+        _lines(list(inspection.notes), "notes")
 
 
 def _lines(lines: list[str], what: str) -> None:
-    for line in lines[:SHOWN]:
+    for line in lines[:MOST_LINES]:
         print(f"  {line}")
-    if len(lines) > SHOWN:
-        print(f"  and {len(lines) - SHOWN} more {what}; --json has all.")
+    if len(lines) > MOST_LINES:
+        print(f"  and {len(lines) - MOST_LINES} more {what}; --json has all.")

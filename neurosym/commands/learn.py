@@ -16,6 +16,7 @@ from neurosym.commands.common import (
     Split,
     family_options,
     progress_bar,
+    progress_bars,
     say,
     taken_by,
 )
@@ -27,12 +28,12 @@ if TYPE_CHECKING:
 
 def demos(
     domain: DomainName,
-    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="Where to write them: a file in .npz.")],
-    recipe: Annotated[str, typer.Option("--recipe", metavar="full|paper", help="Which labels.")] = "full",
-    part: Annotated[str, typer.Option("--part", metavar="train|test|all", help="Of which problems.")] = "train",
+    out: Annotated[Path, typer.Option(metavar="FILE", help="Where to write them: a file in .npz.")],
+    recipe: Annotated[str, typer.Option(metavar="full|paper", help="Which labels.")] = "full",
+    part: Annotated[str, typer.Option(metavar="train|test|all", help="Of which problems.")] = "train",
     split: Split = 0,
     pictures: PictureStyle = Pictures.clean,
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Of the pictures.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Of the pictures.")] = 0,
     option: FamilyOptions = None,
 ) -> None:
     """Write demonstrations of a domain: pictures, orders and shares of valid orders."""
@@ -47,19 +48,19 @@ def demos(
 
 def train(
     domain: DomainName,
-    prior: Annotated[str, typer.Option("--prior", metavar="Q", help="sinkhorn, tcn, sinkhorn-paper or tcn-paper.")],
-    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="The weights: a file in .safetensors.")],
+    prior: Annotated[str, typer.Option(metavar="Q", help="sinkhorn, tcn, sinkhorn-paper or tcn-paper.")],
+    out: Annotated[Path, typer.Option(metavar="FILE", help="The weights: a file in .safetensors.")],
     demos_file: Annotated[
         Path | None, typer.Option("--demos", metavar="FILE", help="Demonstrations of your own; default the domain's.")
     ] = None,
     split: Split = 0,
-    seed: Annotated[int, typer.Option("--seed", min=0, metavar="K", help="Of the pictures and the training.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, metavar="K", help="Of the pictures and the training.")] = 0,
     pictures: PictureStyle = Pictures.clean,
-    epochs: Annotated[int | None, typer.Option("--epochs", min=1, help="Default the recipe's.")] = None,
+    epochs: Annotated[int | None, typer.Option(min=1, help="Default the recipe's.")] = None,
     encoder: Annotated[
-        str | None, typer.Option("--encoder", metavar="NAME", help="small (default) or paper, the paper's CNN.")
+        str | None, typer.Option(metavar="NAME", help="small (default) or paper, the paper's CNN.")
     ] = None,
-    device: Annotated[str, typer.Option("--device", help="cpu or cuda.")] = "cpu",
+    device: Annotated[str, typer.Option(help="cpu or cuda.")] = "cpu",
     option: FamilyOptions = None,
     resume: Annotated[bool, typer.Option("--resume/--no-resume", help="Go on from a run that was killed.")] = True,
 ) -> None:
@@ -96,12 +97,7 @@ def train(
 
 
 def _fit(learner: Any, given: Demonstrations, **options: Any) -> None:
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    err = Console(stderr=True)
-    columns = (BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(), TextColumn("{task.description}"))
-    with Progress(*columns, console=err, disable=not err.is_terminal) as bars:
+    with progress_bars(transient=False) as bars:
         task = bars.add_task("the first epoch", total=None)
 
         def show(now: Any) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -13,13 +12,9 @@ import typer
 from neurosym.commands.assemblies import FileOptions, RemovalOptions, load_assembly
 from neurosym.commands.common import (
     AsJson,
-    Cells,
-    CollapseRule,
-    FamilyOptions,
-    Oracle,
-    OracleName,
     Pictures,
     PictureStyle,
+    SearchOptions,
     family_options,
     print_json,
     problem_options,
@@ -53,36 +48,14 @@ def plan(
     ],
     *,
     number: Annotated[int | None, typer.Option("--problem", metavar="N", help="Number of the problem.")] = None,
-    cells: Cells = None,
-    planner: Annotated[
-        str | None, typer.Option("--planner", metavar="P", help="Default backtracking; with --k best-first.")
-    ] = None,
-    prior: Annotated[
-        str | None,
-        typer.Option(
-            "--prior",
-            metavar="Q",
-            help="Name of a prior, a weights file, or `none`. Default none; for an assembly outermost-first.",
-        ),
-    ] = None,
-    option: FamilyOptions = None,
-    collapse: CollapseRule = None,
-    oracle: OracleName = Oracle.geometry,
+    planner: Annotated[str | None, typer.Option(metavar="P", help="Default backtracking; with --k best-first.")] = None,
+    search: SearchOptions,
     pictures: PictureStyle = Pictures.clean,
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Breaks ties; the same seed gives the same plan.")] = 0,
-    seconds: Annotated[float | None, typer.Option("--seconds", help="Budget: wall-clock time.")] = None,
-    attempts: Annotated[int | None, typer.Option("--attempts", help="Budget: questions to the oracle.")] = None,
-    expansions: Annotated[int | None, typer.Option("--expansions", help="Budget: states expanded.")] = None,
-    k: Annotated[int | None, typer.Option("--k", metavar="K", help="The K best plans, the likeliest first.")] = None,
-    before: Annotated[
-        list[str] | None, typer.Option("--before", metavar="A,B", help="A must come before B. May be repeated.")
-    ] = None,
-    removed: Annotated[
-        list[str] | None, typer.Option("--removed", metavar="V", help="Is gone already. May be repeated.")
-    ] = None,
+    expansions: Annotated[int | None, typer.Option(help="Budget: states expanded.")] = None,
+    k: Annotated[int | None, typer.Option(metavar="K", help="The K best plans, the likeliest first.")] = None,
     files: FileOptions,
     removal: RemovalOptions,
-    out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="Keep it all as JSON.")] = None,
+    out: Annotated[Path | None, typer.Option(metavar="FILE", help="Keep it all as JSON.")] = None,
     as_json: AsJson = False,
 ) -> None:
     """Plan one problem, and show each step with the refusals that led to it; or why there is no plan.
@@ -95,46 +68,40 @@ def plan(
     from neurosym.planning.budget import Budget
     from neurosym.registry import load_domain
 
+    cells = search.own_cells()
     path = _path(what, number, cells)
     family = load_domain("assembly" if path else what)
-    options = problem_options(
-        family,
-        collapse=collapse,
-        pictures=None if pictures is Pictures.clean else pictures.value,
-        before=[pair_of(text) for text in before] if before else None,
-        removed=removed or None,
-    )
-    options |= removal.given() | family_options(option)
+    style = None if pictures is Pictures.clean else pictures.value
+    options = problem_options(family, **search.of_problem(), pictures=style)
+    options |= removal.given() | family_options(search.option)
     source: dict[str, Any] = {}
     if path is None:
         files.reading().refuse(f"{what!r} is a problem family")
         problem = _problem(family, number, cells, options)
         # Pieces of the user's own travel with their plan, so that it can be shown and replayed.
-        source = {} if cells is None else {"cells": cells_in(cells)}
+        source = {} if cells is None else {"cells": cells}
     else:
         assembly = load_assembly(path, files)
         problem = _made(family.problem, assembly, options | {"name": path.resolve().name}, family.name)
         source = {"assembly": reference(path, files.reading(), assembly)}
-    if prior is None:
-        prior = NO_PRIOR if path is None else UNTRAINED
-    chosen = planner or ("backtracking" if k is None else "best-first")
-    budget = Budget(seconds=seconds, attempts=attempts, expansions=expansions)
+    prior = search.prior or (NO_PRIOR if path is None else UNTRAINED)
+    budget = Budget(seconds=search.seconds, attempts=search.attempts, expansions=expansions)
     settings: dict[str, Any] = {
-        "planner": chosen,
+        "planner": planner or ("backtracking" if k is None else "best-first"),
         "prior": None if prior == NO_PRIOR else prior,
         "budget": budget,
-        "oracle": oracle.value,
+        "oracle": search.oracle.value,
     }
-    results = plans(problem, k=k, rng=np.random.default_rng(seed), **settings)
+    results = plans(problem, k=k, rng=np.random.default_rng(search.seed), **settings)
     if not results:
         # The k best of none: ask for one, to be told why there is none.
-        results = [solve(problem, rng=np.random.default_rng(seed), **settings)]
+        results = [solve(problem, rng=np.random.default_rng(search.seed), **settings)]
     answer = {
         **problem_part(family.name, problem, number, options),
         **source,
         **settings,
         "budget": budget.limits,
-        "seed": seed,
+        "seed": search.seed,
         **result_part(results[0]),
     }
     if k is not None:
@@ -148,7 +115,7 @@ def plan(
     raise typer.Exit(results[0].status.exit_code)
 
 
-def _path(what: str, number: int | None, cells: Path | None) -> Path | None:
+def _path(what: str, number: int | None, cells: dict[str, Any] | None) -> Path | None:
     """The path, if that is what was given; a family's name wins where its problem is named, too."""
     from neurosym.registry import domain_names
 
@@ -163,16 +130,9 @@ def _path(what: str, number: int | None, cells: Path | None) -> Path | None:
     return None
 
 
-def _each_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """A JSON object whose keys differ: of two pieces of one name, JSON itself would silently drop the first."""
-    names = [key for key, _ in pairs]
-    twice = sorted({n for n in names if names.count(n) > 1})
-    if twice:
-        raise ValueError(f"{', '.join(twice)} comes twice")
-    return dict(pairs)
-
-
-def _problem(family: ProblemFamily, number: int | None, cells: Path | None, options: dict[str, Any]) -> Problem:
+def _problem(
+    family: ProblemFamily, number: int | None, cells: dict[str, Any] | None, options: dict[str, Any]
+) -> Problem:
     if (number is None) == (cells is None):
         raise InputError("Expected either --problem N or --cells FILE, one of them.")
     if cells is None:
@@ -180,7 +140,7 @@ def _problem(family: ProblemFamily, number: int | None, cells: Path | None, opti
     make = getattr(family, "problem_from_cells", None)
     if make is None:
         raise InputError(f"Expected a domain of polycube puzzles (soma) for --cells; {family.name!r} is none.")
-    return _made(make, cells_in(cells), options, family.name)
+    return _made(make, cells, options, family.name)
 
 
 def _made(make: Callable[..., Problem], given: Any, options: dict[str, Any], whose: str) -> Problem:
@@ -189,23 +149,6 @@ def _made(make: Callable[..., Problem], given: Any, options: dict[str, Any], who
         return make(given, **options)
     except TypeError as error:
         raise InputError(f"Expected options that problems of {whose!r} take; {error}.") from None
-
-
-def cells_in(path: Path) -> dict[str, Any]:
-    try:
-        given = json.loads(path.read_text(encoding="utf-8"), object_pairs_hook=_each_once)
-    except ValueError as error:
-        raise InputError(f'Expected JSON {{"name": [[x, y, z], ...]}} in {path}; got: {error}.') from None
-    if not isinstance(given, dict) or not all(isinstance(own, list) for own in given.values()):
-        raise InputError(f'Expected JSON {{"name": [[x, y, z], ...]}} in {path}; got something else.')
-    return given
-
-
-def pair_of(text: str) -> tuple[str, str]:
-    names = [name.strip() for name in text.split(",")]
-    if len(names) != 2 or not all(names):
-        raise InputError(f"Expected --before A,B: two names with a comma between; got {text!r}.")
-    return names[0], names[1]
 
 
 def _show(problem: Problem, results: Sequence[PlanResult], answer: dict[str, Any]) -> None:
@@ -226,8 +169,8 @@ def _show(problem: Problem, results: Sequence[PlanResult], answer: dict[str, Any
         for refusal in best.blame[-LAST_REFUSALS:]:
             print(f"  after {joined(refusal.after) or 'nothing'}, not {refusal.action}: {refusal.reason}")
     counts = {"iteration": best.iterations, "attempt": best.attempts, "expansion": best.expansions}
-    said = ", ".join(f"{n} {what}{'' if n == 1 else 's'}" for what, n in counts.items())
-    print(f"{said}, {1000 * best.seconds:.1f} ms")
+    figures = ", ".join(f"{n} {what}{'' if n == 1 else 's'}" for what, n in counts.items())
+    print(f"{figures}, {1000 * best.seconds:.1f} ms")
     for rank, other in enumerate(results if len(results) > 1 else (), 1):
         cost = "" if other.cost is None else f"  (cost {other.cost:.3f} nats)"
         print(f"plan {rank}: {' '.join(other.plan or ())}{cost}")

@@ -21,13 +21,10 @@ FILM_SIZE, STILL_SIZE = (640, 480), (960, 720)
 
 def render(
     what: Annotated[
-        str,
-        typer.Argument(metavar="PATH|DOMAIN", help="An assembly of yours, or a family; --plan says which problem."),
+        str, typer.Argument(metavar="PATH|DOMAIN", help="An assembly of yours, or a family; --plan says which problem.")
     ],
     *,
-    plan: Annotated[
-        Path | None, typer.Option("--plan", metavar="PLAN", help="What `neurosym plan --out` wrote.")
-    ] = None,
+    plan: Annotated[Path | None, typer.Option(metavar="PLAN", help="What `neurosym plan --out` wrote.")] = None,
     number: Annotated[
         int | None, typer.Option("--problem", metavar="N", help="Number of the problem, where there is no plan.")
     ] = None,
@@ -35,20 +32,14 @@ def render(
     collapse: CollapseRule = None,
     files: FileOptions,
     out: Annotated[
-        Path | None,
-        typer.Option("--out", metavar="FILM", help="A film of the plan: .gif, .mp4 (extra `video`), or a folder."),
+        Path | None, typer.Option(metavar="FILM", help="A film of the plan: .gif, .mp4 (extra `video`), or a folder.")
     ] = None,
     exploded: Annotated[
-        Path | None,
-        typer.Option(
-            "--exploded",
-            metavar="FILE.png",
-            help="The parts pulled apart, as the plan does: a picture.",
-        ),
+        Path | None, typer.Option(metavar="FILE.png", help="The parts pulled apart, as the plan does: a picture.")
     ] = None,
-    spread: Annotated[float, typer.Option("--spread", min=0.0, help="How far apart in the exploded view.")] = 1.0,
+    spread: Annotated[float, typer.Option(min=0.0, help="How far apart in the exploded view.")] = 1.0,
     size: Annotated[
-        str | None, typer.Option("--size", metavar="WxH", help="In pixels; default 640x480, and 960x720 exploded.")
+        str | None, typer.Option(metavar="WxH", help="In pixels; default 640x480, and 960x720 exploded.")
     ] = None,
     view: Annotated[
         str | None,

@@ -33,16 +33,15 @@ def replay(
         bool, typer.Option("--pull", help="Drag parts by a grip, against friction, instead of taking them by hand.")
     ] = False,
     bodies: Annotated[
-        Bodies | None, typer.Option("--bodies", help="Rigid parts, or independent cubes. Default: the problem's rule.")
+        Bodies | None, typer.Option(help="Rigid parts, or independent cubes. Default: the problem's rule.")
     ] = None,
     friction: Annotated[
-        float | None, typer.Option("--friction", min=0.0, help="Between any two parts. Default: the problem's.")
+        float | None, typer.Option(min=0.0, help="Between any two parts. Default: the problem's.")
     ] = None,
     threshold: Annotated[
-        float | None,
-        typer.Option("--threshold", min=0.0, help="Displacement that counts as moved. Default: 0.2 of a typical body."),
+        float | None, typer.Option(min=0.0, help="Displacement that counts as moved. Default: 0.2 of a typical body.")
     ] = None,
-    out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="Keep the report as JSON.")] = None,
+    out: Annotated[Path | None, typer.Option(metavar="FILE", help="Keep the report as JSON.")] = None,
     as_json: AsJson = False,
 ) -> None:
     """Do a plan in PyBullet, with gravity: did the rest stand still at each step, and by how much did it move?"""

@@ -1,4 +1,4 @@
-"""`neurosym reproduce`: rebuild an experiment of the paper, beside the paper's figures."""
+"""`neurosym reproduce` and `neurosym results`: rebuild the paper's experiments, and put their reports on one page."""
 
 from __future__ import annotations
 
@@ -37,34 +37,25 @@ ExperimentName = Annotated[
 
 def reproduce(
     name: ExperimentName,
-    seeds: Annotated[
-        int | None, typer.Option("--seeds", min=1, metavar="K", help="Splits and trainings, 0 to K - 1.")
-    ] = None,
+    seeds: Annotated[int | None, typer.Option(min=1, metavar="K", help="Splits and trainings, 0 to K - 1.")] = None,
     scale: Annotated[
-        Scale, typer.Option("--scale", help="Within 15 minutes on two cores, or of the paper's sizes and seeds.")
+        Scale, typer.Option(help="Within 15 minutes on two cores, or of the paper's sizes and seeds.")
     ] = Scale.quick,
     workers: Annotated[
-        int | None,
-        typer.Option("--workers", min=1, metavar="N", help="Most at a time. Default one a processor; ray: its own."),
+        int | None, typer.Option(min=1, metavar="N", help="Most at a time. Default one a processor; ray: its own.")
     ] = None,
-    engine: Annotated[
-        EngineName, typer.Option("--engine", help="Processes here, or an existing Ray cluster.")
-    ] = EngineName.local,
+    engine: Annotated[EngineName, typer.Option(help="Processes here, or an existing Ray cluster.")] = EngineName.local,
     address: Annotated[
-        str | None,
-        typer.Option("--address", metavar="HOST:PORT", help="Of the Ray cluster. Default the one on this machine."),
+        str | None, typer.Option(metavar="HOST:PORT", help="Of the Ray cluster. Default the one on this machine.")
     ] = None,
-    pictures: Annotated[
-        list[Pictures] | None, typer.Option("--pictures", help="soma: style; may be repeated. Default both.")
-    ] = None,
+    pictures: Annotated[list[Pictures] | None, typer.Option(help="soma: style; may be repeated. Default both.")] = None,
     prior: Annotated[
-        list[str] | None,
-        typer.Option("--prior", metavar="Q", help="What is trained; may be repeated. Default all."),
+        list[str] | None, typer.Option(metavar="Q", help="What is trained; may be repeated. Default all.")
     ] = None,
-    epochs: Annotated[int | None, typer.Option("--epochs", min=1, help="Default each recipe's.")] = None,
-    repeats: Annotated[int, typer.Option("--repeats", min=1, help="soma: how often each problem is planned.")] = 5,
+    epochs: Annotated[int | None, typer.Option(min=1, help="Default each recipe's.")] = None,
+    repeats: Annotated[int, typer.Option(min=1, help="soma: how often each problem is planned.")] = 5,
     out: Annotated[
-        Path | None, typer.Option("--out", metavar="DIR", help="Default out/reproduce-NAME, for paper with -paper.")
+        Path | None, typer.Option(metavar="DIR", help="Default out/reproduce-NAME, for paper with -paper.")
     ] = None,
 ) -> None:
     """Rebuild an experiment of the paper; writes results.csv, report.md and figures.
@@ -97,3 +88,20 @@ def reproduce(
             page = imitation.report(results)
     print(page)  # a table of Markdown: rendered, its columns would not fit a terminal
     say(f"{folder}: results.csv, report.md and figures")
+
+
+def results(
+    folders: Annotated[
+        list[Path] | None,
+        typer.Argument(metavar="[DIR]...", help="Folders of `neurosym reproduce`. Default all out/reproduce-*."),
+    ] = None,
+    to: Annotated[Path, typer.Option(metavar="FILE", help="The page; figures lie beside it.")] = Path(
+        "docs/results.md"
+    ),
+) -> None:
+    """Put the reports of finished experiments on one page, with small copies of their figures."""
+    from neurosym.experiments.results_page import finished_runs, write_results_page
+
+    runs = folders or finished_runs(Path("out"))
+    write_results_page(runs, to)
+    say(f"{to}: {len(runs)} experiment{'s' if len(runs) > 1 else ''}")

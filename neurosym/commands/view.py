@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from neurosym.commands.assemblies import FileOptions, RemovalOptions
-from neurosym.commands.common import Cells, CollapseRule, FamilyOptions, Oracle, OracleName, family_options, say
-from neurosym.commands.plan import cells_in, pair_of
+from neurosym.commands.common import SearchOptions, family_options, say
 from neurosym.errors import InputError
 
 if TYPE_CHECKING:
@@ -35,38 +34,17 @@ def view(
     number: Annotated[
         int | None, typer.Option("--problem", metavar="N", help="Number of the domain's problem; default 0.")
     ] = None,
-    planner: Annotated[str, typer.Option("--planner", metavar="P", help="Name of a planner.")] = "backtracking",
-    prior: Annotated[
-        str | None,
-        typer.Option(
-            "--prior",
-            metavar="Q",
-            help="Name of a prior, a weights file, or `none`. Default none; for an assembly outermost-first.",
-        ),
-    ] = None,
-    cells: Cells = None,
-    option: FamilyOptions = None,
-    collapse: CollapseRule = None,
-    before: Annotated[
-        list[str] | None, typer.Option("--before", metavar="A,B", help="A must come before B. May be repeated.")
-    ] = None,
-    removed: Annotated[
-        list[str] | None, typer.Option("--removed", metavar="V", help="Is gone already. May be repeated.")
-    ] = None,
+    planner: Annotated[str, typer.Option(metavar="P", help="Name of a planner.")] = "backtracking",
+    search: SearchOptions,
     files: FileOptions,
     removal: RemovalOptions,
-    oracle: OracleName = Oracle.geometry,
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Breaks ties; the same seed gives the same plan.")] = 0,
-    seconds: Annotated[float | None, typer.Option("--seconds", help="Budget: wall-clock time.")] = None,
-    attempts: Annotated[int | None, typer.Option("--attempts", help="Budget: questions to the oracle.")] = None,
-    host: Annotated[str, typer.Option("--host", help="Where to listen; 0.0.0.0 lets the whole network in.")] = LOOPBACK,
+    host: Annotated[str, typer.Option(help="Where to listen; 0.0.0.0 lets the whole network in.")] = LOOPBACK,
     port: Annotated[
-        int, typer.Option("--port", min=0, max=65535, help="Where to listen; the next free one if taken, 0 any.")
+        int, typer.Option(min=0, max=65535, help="Where to listen; the next free one if taken, 0 any.")
     ] = 8080,
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in a browser.")] = True,
     export: Annotated[
-        Path | None,
-        typer.Option("--export", metavar="FILE.html", help="Write a page that plays without a server, and exit."),
+        Path | None, typer.Option(metavar="FILE.html", help="Write a page that plays without a server, and exit.")
     ] = None,
 ) -> None:
     """Look at a plan: step by step in 3D, with what the prior believed and where the search went."""
@@ -80,26 +58,21 @@ def view(
 
     if export is not None:
         check_name(export)
-    named = {
-        "collapse": collapse,
-        "before": [pair_of(text) for text in before] if before else None,
-        "removed": removed or None,
-    }
-    options = {name: value for name, value in named.items() if value is not None}
+    options = {name: value for name, value in search.of_problem().items() if value is not None}
     query = Query(
         domain=target,
         number=number,
-        options=options | removal.given() | family_options(option),
+        options=options | removal.given() | family_options(search.option),
         planner=planner,
-        prior=None if prior == "none" else prior,
-        oracle=oracle.value,
-        seed=seed,
-        seconds=seconds,
-        attempts=attempts,
+        prior=None if search.prior == "none" else search.prior,
+        oracle=search.oracle.value,
+        seed=search.seed,
+        seconds=search.seconds,
+        attempts=search.attempts,
     )
     check_query(query)
-    source = open_source(query, None if cells is None else cells_in(cells), files.reading())
-    if prior is None and source.saved is None:
+    source = open_source(query, search.own_cells(), files.reading())
+    if search.prior is None and source.saved is None:
         source = replace(source, query=replace(source.query, prior=source.usual_prior))
     shown = None if source.saved is None else Shown.saved(source.saved)
     if export is None:
