@@ -333,16 +333,16 @@ def test_facts_agree_with_what_planners_ask(soma):
     world, there = problem.geometry, problem.world.names
     free = ns.predicates.free(next(f for f in problem.domain.fluents if f.name == "present"))
     for name in world.names:
-        found = part_facts(world, name, there)
+        facts = part_facts(world, name, there)
         state = ns.language.grounding.BitState(problem.ground(), problem.ground().initial)
         verdict = free.function(world, state, name)
-        assert any(way.free for way in found.ways) == verdict.holds
-        assert {b for way in found.ways for b in way.blockers} >= set(verdict.because)
-        for other in found.touches:
+        assert any(e.free for e in facts.exits) == verdict.holds
+        assert {b for e in facts.exits for b in e.blockers} >= set(verdict.because)
+        for other in facts.touches:
             assert name in part_facts(world, other, there).touches
-        for other in found.carries:
+        for other in facts.carries:
             assert name in part_facts(world, other, there).stands_on
-        assert set(found.stands_on) | set(found.carries) <= set(found.touches)
+        assert set(facts.stands_on) | set(facts.carries) <= set(facts.touches)
 
 
 def test_facts_speak_of_the_parts_that_are_there():
@@ -350,7 +350,7 @@ def test_facts_speak_of_the_parts_that_are_there():
     both, alone = (part_facts(world, "low", there) for there in (world.names, ("low",)))
     assert both.carries == ("high",)
     assert both.on_table
-    ways = {way.direction: way for way in both.ways}
+    ways = {way.direction: way for way in both.exits}
     assert ways["+z"].blockers == ("high",)
     assert ways["-z"].into_table
     assert ways["+x"].free

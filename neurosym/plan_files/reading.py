@@ -11,11 +11,17 @@ from typing import TYPE_CHECKING, Any
 from neurosym.errors import InputError
 from neurosym.geometry.readers.references import referenced
 from neurosym.geometry.step_motion import StepMotion
+from neurosym.language.search_problem import Rejection
 from neurosym.plan_files.writing import SCHEMA
+from neurosym.planning.result import Status
 from neurosym.registry import load_domain
 
 if TYPE_CHECKING:
     from neurosym.language.problem import Problem
+
+#: Figures of a search.
+COUNTS = ("iterations", "attempts", "expansions", "seconds")
+
 
 @dataclass(frozen=True, eq=False)
 class SavedPlan:
@@ -32,6 +38,44 @@ class SavedPlan:
     plan: tuple[str, ...]
     motions: tuple[StepMotion | None, ...]
     document: Mapping[str, Any]
+
+    def account(self) -> Account:
+        """What the search did.
+
+        Raises:
+            InputError: it is not what `neurosym plan --out` writes.
+        """
+        document = self.document
+        try:
+            return Account(
+                Status[document["status"]],
+                tuple(
+                    Rejection(str(r["reason"]), tuple(r["because"]), action=str(r["action"]), after=tuple(r["after"]))
+                    for r in document["refusals"]
+                ),
+                {name: document[name] for name in COUNTS if isinstance(document[name], int | float)},
+                tuple(map(str, (document.get("why_not") or {}).get("sentences", ()))),
+            )
+        except (AttributeError, KeyError, TypeError) as error:
+            raise InputError(f"Expected a plan's file as `neurosym plan --out` writes it; got {error!r}.") from None
+
+
+@dataclass(frozen=True, eq=False)
+class Account:
+    """What a plan's file tells of its search: `counts` are figures by name, `why_not` is in sentences."""
+
+    status: Status
+    refusals: tuple[Rejection, ...]
+    counts: Mapping[str, float]
+    why_not: tuple[str, ...]
+
+
+def read_search(path: str | Path) -> SavedPlan:
+    """Read a plan or, of a search without one, the longest prefix that works, whose motions the file does not say."""
+    document = read_document(Path(path))
+    if document.get("plan") is not None:
+        return read_plan(path)
+    return SavedPlan(problem_of(document, path), tuple(map(str, document.get("best_prefix") or ())), (), document)
 
 
 def read_plan(path: str | Path) -> SavedPlan:
@@ -95,8 +139,8 @@ def read_document(path: Path) -> dict[str, Any]:
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
-        said = error.strerror or error
-        raise InputError(f"Expected a plan at {path}; {said}. Write one with `neurosym plan ... --out`.") from None
+        reason = error.strerror or error
+        raise InputError(f"Expected a plan at {path}; {reason}. Write one with `neurosym plan ... --out`.") from None
     except (ValueError, RecursionError) as error:
         raise InputError(f"Expected JSON, as `neurosym plan --out` writes it, in {path}; got: {error}.") from None
     if not isinstance(document, dict):

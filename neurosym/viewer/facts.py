@@ -10,14 +10,8 @@ from neurosym.geometry.queries import AssemblyGeometry
 
 
 @dataclass(frozen=True)
-class Way:
-    """One direction in which a part might leave.
-
-    Attributes:
-        direction: in words, ``+z``.
-        blockers: names of the parts in the way, of those that are there.
-        into_table: whether the way leads into the table.
-    """
+class Exit:
+    """A direction (in words: ``+z``) in which a part might leave; which parts block it there, and whether the table."""
 
     direction: str
     blockers: tuple[str, ...]
@@ -30,17 +24,9 @@ class Way:
 
 @dataclass(frozen=True)
 class PartFacts:
-    """Facts about one part among the parts that are there.
+    """Facts about one part, which may be gone itself, and the names of those that it touches, of the parts in place.
 
-    Attributes:
-        name: of the part.
-        present: whether it is in place itself.
-        touches: parts in contact with it.
-        on_table: whether it touches the table.
-        stands_on: parts that touch it from below.
-        carries: parts that it touches from below.
-        ways: one a direction in which the assembly is built.
-        fixed: whether it never moves.
+    It stands on those that touch it from below, and has one exit for each direction in which its assembly is built.
     """
 
     name: str
@@ -49,7 +35,7 @@ class PartFacts:
     on_table: bool
     stands_on: tuple[str, ...]
     carries: tuple[str, ...]
-    ways: tuple[Way, ...]
+    exits: tuple[Exit, ...]
     fixed: bool = False
 
 
@@ -69,8 +55,8 @@ def part_facts(given: Assembly | AssemblyGeometry, name: str, there: Collection[
     among = assembly.mask(there) & ~(1 << number)
     stability, graph = geometry.stability, geometry.blocking()
     carried = sum(1 << i for i in range(len(assembly)) if stability.supports[i] >> number & 1)
-    ways = tuple(
-        Way(graph.describe(d), assembly.in_mask(graph.blockers(number, d, among)), bool(graph.into_table[d]))
+    exits = tuple(
+        Exit(graph.describe(d), assembly.in_mask(graph.blockers(number, d, among)), bool(graph.into_table[d]))
         for d in range(len(graph.vectors))
     )
     return PartFacts(
@@ -80,6 +66,6 @@ def part_facts(given: Assembly | AssemblyGeometry, name: str, there: Collection[
         on_table=bool(stability.on_table >> number & 1),
         stands_on=assembly.in_mask(stability.supports[number] & among),
         carries=assembly.in_mask(carried & among),
-        ways=ways,
+        exits=exits,
         fixed=name in assembly.fixed,
     )

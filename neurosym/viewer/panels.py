@@ -26,7 +26,10 @@ WIDTH = 360
 def overview(shown: Shown) -> str:
     """How the search ended, its figures, and notes on what is missing."""
     search = shown.search
-    figures = ", ".join(f"{_figure(value)} {name}" for name, value in search.counts.items())
+    figures = ", ".join(
+        f"{value:,} {name}" if isinstance(value, int) else f"{value:.3g} {name}"
+        for name, value in search.counts.items()
+    )
     notes = "".join(f"<p class='note'>{escape(note)}</p>" for note in shown.notes)
     mark = "✔" if search.solved else "✘"
     return (
@@ -52,40 +55,38 @@ def pictures(views: NDArray[np.uint8] | None) -> str:
     """The observation, one picture a view."""
     if views is None or not len(views):
         return "<p>There are no reference pictures.</p>"
-    width = int(WIDTH / min(len(views), 2)) - 8
+    alone = len(views) == 1
+    width, most = int(WIDTH / (1 if alone else 2)) - 8, 100 if alone else 48
     images = "".join(
         f"<img src='{as_data(view)}' width='{width}' alt='view {i}' "
-        "style='image-rendering:pixelated;border-radius:4px;margin:2px;max-width:48%'>"
+        f"style='image-rendering:pixelated;border-radius:4px;margin:2px;max-width:{most}%'>"
         for i, view in enumerate(views, 1)
     )
-    if len(views) == 1:
-        images = images.replace("max-width:48%", "max-width:100%")
     return f"<div>{images}</div>"
 
 
-def facts(found: PartFacts) -> str:
+def facts(part: PartFacts) -> str:
     """What geometry knows of a part."""
-    table = "the table" if found.on_table else ""
+    table = "the table" if part.on_table else ""
     rows = [
-        ("touches", _names(found.touches, table)),
-        ("stands on", _names(found.stands_on, table)),
-        ("carries", _names(found.carries)),
+        ("touches", _names(part.touches, table)),
+        ("stands on", _names(part.stands_on, table)),
+        ("carries", _names(part.carries)),
     ]
-    ways = []
-    for way in found.ways:
-        blocked = "the table" if way.into_table else ""
-        said = "<b style='color:#00724f'>free</b>" if way.free else _names(way.blockers, blocked)
-        ways.append((escape(way.direction), said))
-    state = "fixed" if found.fixed else "in place" if found.present else "not in place"
+    free = "<b style='color:#00724f'>free</b>"
+    exits = [
+        (escape(e.direction), free if e.free else _names(e.blockers, "the table" if e.into_table else ""))
+        for e in part.exits
+    ]
+    state = "fixed" if part.fixed else "in place" if part.present else "not in place"
     return (
-        f"<p><b>{escape(found.name)}</b> <span class='quiet'>{state}</span></p>{_table(rows)}"
-        f"<p style='margin-bottom:0'>in the way, by direction</p>{_table(ways)}"
+        f"<p><b>{escape(part.name)}</b> <span class='quiet'>{state}</span></p>{_table(rows)}"
+        f"<p style='margin-bottom:0'>in the way, by direction</p>{_table(exits)}"
     )
 
 
 def _names(names: Sequence[str], also: str = "") -> str:
-    found = escape(", ".join(filter(None, [some(names), also])))
-    return found or "<span class='quiet'>nothing</span>"
+    return escape(", ".join(filter(None, [some(names), also]))) or "<span class='quiet'>nothing</span>"
 
 
 def _table(rows: Sequence[tuple[str, str]]) -> str:
@@ -103,8 +104,8 @@ def options(domain: str, known: Mapping[str, Any] | None) -> str:
         return f"<p class='quiet'>{escape(domain)} does not list the options that it takes.</p>"
     if not known:
         return f"<p class='quiet'>{escape(domain)} takes none.</p>"
-    said = ", ".join(f"<b>{escape(name)}</b>{_default(value)}" for name, value in known.items())
-    return f"<p class='quiet'>{escape(domain)} takes {said}.</p>"
+    takes = ", ".join(f"<b>{escape(name)}</b>{_default(value)}" for name, value in known.items())
+    return f"<p class='quiet'>{escape(domain)} takes {takes}.</p>"
 
 
 def _default(value: object) -> str:
@@ -139,7 +140,3 @@ def as_data(picture: NDArray[np.uint8]) -> str:
     file = io.BytesIO()
     Image.fromarray(picture).save(file, format="PNG", optimize=True)
     return f"data:image/png;base64,{base64.b64encode(file.getvalue()).decode()}"
-
-
-def _figure(value: float) -> str:
-    return f"{value:,}" if isinstance(value, int) else f"{value:.3g}"

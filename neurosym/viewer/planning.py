@@ -24,14 +24,9 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a search is.
+    """How far a search is: what it does, in words, its counts, and the seconds since it began.
 
-    Attributes:
-        phase: what is being done, in words.
-        attempts, refusals, expansions: so far.
-        depth: length of the longest prefix that works, of `steps` at most.
-        steps: number of action primitives; 0 while unknown.
-        seconds: since it began.
+    The longest prefix that works has length `depth`, of `steps` (action primitives; 0 while unknown) at most.
     """
 
     phase: str
@@ -44,14 +39,10 @@ class Progress:
 
 
 class Planning:
-    """One search in a thread of its own, which can be watched and stopped.
+    """One search in a thread of its own, which can be watched and stopped: of what `make` gives, which may raise.
 
     A stop is heeded before the next attempt or expansion, and between the phases; an attempt that is under way (a
     simulation, a free-form path) is waited for.
-
-    Args:
-        make: gives the problem; it may take long, and raise what the library refuses.
-        query: how to plan it.
     """
 
     def __init__(self, make: Callable[[], Problem], query: Query) -> None:
@@ -61,7 +52,7 @@ class Planning:
         self._make = make
         self._stop = threading.Event()
         self._start = time.perf_counter()
-        self._progress = Progress("building the problem")
+        self.progress = Progress("building the problem")
         self._thread = threading.Thread(target=self._run, name="neurosym planning", daemon=True)
         self._thread.start()
 
@@ -73,10 +64,6 @@ class Planning:
     def stopped(self) -> bool:
         """Whether a stop was asked for."""
         return self._stop.is_set()
-
-    @property
-    def progress(self) -> Progress:
-        return self._progress
 
     def stop(self) -> None:
         """Ask the search to end; it keeps the longest prefix that works."""
@@ -115,19 +102,12 @@ class Planning:
 
     def _between(self, phase: str, problem: Problem) -> bool:
         """Enter a phase; whether a stop was asked for before it."""
-        self._progress = Progress(phase, steps=len(problem.actions), seconds=time.perf_counter() - self._start)
+        self.progress = Progress(phase, steps=len(problem.actions), seconds=time.perf_counter() - self._start)
         return self._stop.is_set()
 
     def _watch(self, log: SearchLog[Any]) -> bool:
-        self._progress = Progress(
-            "searching",
-            log.attempts,
-            log.iterations,
-            log.expansions,
-            len(log.best_prefix),
-            len(log.problem.actions),
-            time.perf_counter() - self._start,
-        )
+        counts = (log.attempts, log.iterations, log.expansions, len(log.best_prefix), len(log.problem.actions))
+        self.progress = Progress("searching", *counts, time.perf_counter() - self._start)
         return self._stop.is_set()
 
 
@@ -141,10 +121,7 @@ def maker_of(domain: str, given: Mapping[str, Maker]) -> Maker:
 
 
 def problem_maker(query: Query, given: Mapping[str, Maker]) -> Callable[[], Problem]:
-    """A function that makes the problem of a query.
-
-    Args:
-        given: what the command line was given, by the name it bears on the page.
+    """A function that makes the problem of a query, where `given` makes those that the command line was given, by name.
 
     Raises:
         InputError: no such domain, no number where one is needed, or an option that the domain does not take.

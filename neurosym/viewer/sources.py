@@ -11,7 +11,7 @@ from typing import Any
 from neurosym.errors import InputError, UnknownNameError
 from neurosym.geometry.readers.references import Reading
 from neurosym.language.problem import Problem
-from neurosym.plan_files.reading import SavedPlan, problem_of, read_document, read_plan
+from neurosym.plan_files.reading import SavedPlan, problem_of, read_document, read_search
 from neurosym.registry import domain_names, load_domain
 from neurosym.viewer.planning import problem_maker
 from neurosym.viewer.shown import Maker, Query
@@ -29,7 +29,6 @@ class Source:
 
     Attributes:
         query: what the page asks for at first.
-        problem: the problem, made.
         given: what bears no number in a family: name on the page -> what makes it, of options.
         saved: the plan, where a file holds one.
         usual_prior: the prior that it is planned with where nobody names one.
@@ -76,8 +75,10 @@ def _puzzle(query: Query, cells: Mapping[str, Any]) -> Source:
     family = load_domain(query.domain)
     make = getattr(family, "problem_from_cells", None)
     if make is None or query.number is not None:
-        said = f"{query.domain!r}{'' if query.number is None else f' and the number {query.number}'}"
-        raise InputError(f"Expected cells with a domain of polycube puzzles (soma), without a number; got {said}.")
+        number = "" if query.number is None else f" and the number {query.number}"
+        raise InputError(
+            f"Expected cells with a domain of polycube puzzles (soma), without a number; got {query.domain!r}{number}."
+        )
     given: dict[str, Maker] = {PUZZLE: partial(make, cells)}
     query = replace(query, domain=PUZZLE)
     return Source(query, problem_maker(query, given)(), given)
@@ -92,29 +93,21 @@ def _is_plan(path: Path) -> bool:
 
 
 def _plan_at(path: Path, query: Query) -> Source:
-    document = read_document(path)
-    if document.get("plan") is None:
-        # A search that found nothing is worth a look, too.
-        prefix = tuple(map(str, document.get("best_prefix") or ()))
-        saved = SavedPlan(problem_of(document, path), prefix, (), document)
-    else:
-        saved = read_plan(path)
+    saved = read_search(path)
+    document = saved.document
     options = document.get("options") or {}
     settings = {key: document[key] for key in ("planner", "prior", "oracle", "seed") if document.get(key) is not None}
     domain, number, given = document["domain"], document.get("number"), {}
     if number is None:
         domain = _name_for(path)
-        given = {domain: _again(document, path)}
+
+        @wraps(load_domain(document["domain"]).problem)  # whose options it takes
+        def make(**options: Any) -> Problem:
+            return problem_of({**document, "options": options}, path)
+
+        given = {domain: make}
     query = Query(domain, number, options, seconds=query.seconds, attempts=query.attempts, **settings)
     return Source(query, saved.problem, given, saved)
-
-
-def _again(document: Mapping[str, Any], path: Path) -> Maker:
-    @wraps(load_domain(document["domain"]).problem)  # whose options it takes
-    def make(**options: Any) -> Problem:
-        return problem_of({**document, "options": options}, path)
-
-    return make
 
 
 def _assembly_at(path: Path, query: Query, reading: Reading) -> Source:
