@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from neurosym.errors import InputError
+from neurosym.language.options import read_options
 from neurosym.language.problem_family import ProblemFamily, Progress
 from neurosym.support.files import write_text
 
@@ -145,16 +146,7 @@ def problem_options(family: ProblemFamily, **wanted: Any) -> dict[str, Any]:
 
 def family_options(given: Sequence[str] | None) -> dict[str, Any]:
     """``KEY=VALUE`` as the family's own options: a value that is JSON (a number, true, a list) is read as such."""
-    options: dict[str, Any] = {}
-    for text in given or ():
-        key, equals, value = text.partition("=")
-        if not equals or not key.isidentifier():
-            raise InputError(f"Expected an option as KEY=VALUE, for instance variant=unique; got {text!r}.")
-        try:
-            options[key] = json.loads(value)
-        except ValueError:
-            options[key] = value
-    return options
+    return read_options(given or (), "an option as KEY=VALUE, for instance variant=unique")
 
 
 def taken_by(function: Callable[..., Any], options: Mapping[str, Any]) -> dict[str, Any]:

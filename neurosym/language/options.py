@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import json
 from collections.abc import Callable, Iterable
 from typing import Any
 
@@ -33,3 +34,21 @@ def check_options(make: Callable[..., Any], given: Iterable[str], whose: str) ->
     if known is not None and wrong:
         takes = f"options of {whose!r} among {', '.join(known)}" if known else f"no option for {whose!r}"
         raise InputError(f"Expected {takes}; got {', '.join(wrong)}.")
+
+
+def read_options(texts: Iterable[str], expected: str) -> dict[str, Any]:
+    """Options that somebody typed as ``key=value``: a value that is JSON is read as such, anything else is text.
+
+    Raises:
+        InputError: a text is something else; the message says what was `expected`.
+    """
+    options: dict[str, Any] = {}
+    for text in texts:
+        key, equals, value = text.partition("=")
+        if not equals or not key.isidentifier():
+            raise InputError(f"Expected {expected}; got {text!r}.")
+        try:
+            options[key] = json.loads(value)
+        except ValueError:
+            options[key] = value
+    return options

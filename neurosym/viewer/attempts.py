@@ -23,11 +23,10 @@ REFUSED, BECAUSE = (213, 94, 0), (0, 114, 178)
 def attempts(search: Search, around: int = 0) -> str:
     """Attempts in the order in which they were made: refused ones with their reasons, and the steps of the plan.
 
-    Args:
-        search: what was tried.
-        around: number of a refusal, from 1, which is among those written out where there are too many; 0: the first.
+    Where there are too many, refusal number `around` (from 1) is among those written out; 0: the first.
     """
-    first, end = _in_reach(len(search.refusals), around)
+    first = max(around - 1, 0) // MOST_REFUSALS * MOST_REFUSALS
+    end = min(first + MOST_REFUSALS, len(search.refusals))
     rows: list[str] = []
     on_path, done = search.steps, 0
     for number, refusal in enumerate(search.refusals[:end], 1):
@@ -53,22 +52,13 @@ def most_refused(search: Search) -> str:
     if len(search.refusals) <= FEW:
         return ""
     count = Counter(r.action for r in search.refusals)
-    reasons: dict[str, Counter[str]] = {}
-    for r in search.refusals:
-        reasons.setdefault(r.action, Counter())[r.reason] += 1
     rows = []
     for action, times in count.most_common(MOST_COUNTED):
-        ((reason, often),) = reasons[action].most_common(1)
+        ((reason, often),) = Counter(r.reason for r in search.refusals if r.action == action).most_common(1)
         others = f" <span class='quiet'>({often:,}×)</span>" if often < times else ""
         rows.append(f"<li><b>{escape(action)}</b> {times:,}×: {escape(reason)}{others}</li>")
     left = f"<p class='quiet'>and {len(count) - MOST_COUNTED} more actions</p>" if len(count) > MOST_COUNTED else ""
     return f"<p><b>Refused most often</b>, and mostly why</p><ul>{''.join(rows)}</ul>{left}<p><b>In order</b></p>"
-
-
-def _in_reach(total: int, around: int) -> tuple[int, int]:
-    """How many refusals come before those written out, and the number of the last of these: pages of even length."""
-    page = max(around - 1, 0) // MOST_REFUSALS
-    return page * MOST_REFUSALS, min((page + 1) * MOST_REFUSALS, total)
 
 
 def _kept(step: int, action: str) -> str:

@@ -71,7 +71,7 @@ def _film(shown: Shown) -> str:
 def _with_panel(film: str, shown: Shown) -> str:
     """The player with what the panel of the page says beside it."""
     search, total = shown.search, len(shown.search.steps)
-    said = (
+    content = (
         f"<div id='now'>{caption(shown, 0.0)}</div>{panels.overview(shown)}"
         f"<div id='steps'>{steps(shown, None)}</div>"
         f"<p class='quiet hint'>A click on a step goes there and waits; the player's button plays on.</p>"
@@ -91,8 +91,6 @@ def _with_panel(film: str, shown: Shown) -> str:
     times = (0.0, *(i + 0.5 for i in range(total)), float(total))
     script = follower([caption(shown, t) for t in times], PAUSE, SECONDS_PER_STEP) if total else ""
     title = f"<title>{escape(shown.problem.name)}</title>"
-    aside = f"{style}<aside id='said'>{panels.styled(said)}</aside>{script}"
-    head, body = "<title>Viser</title>", "</body>"
-    page = film.replace(head, title, 1) if head in film else film
-    before, found, after = page.rpartition(body)
-    return f"{before}{aside}{found}{after}" if found else page + aside
+    aside = f"{style}<aside id='said'>{panels.styled(content)}</aside>{script}"
+    before, body, after = film.replace("<title>Viser</title>", title, 1).rpartition("</body>")
+    return f"{before}{aside}{body}{after}" if body else after + aside

@@ -16,13 +16,10 @@ LOOKS = 10
 def follower(captions: Sequence[str], pause: float, seconds_per_step: float) -> str:
     """An HTML script that marks the step under way in `#steps`, says it in `#now`, and goes to a step that is clicked.
 
-    Args:
-        captions: HTML: before the first step, then one a step, then after the last.
-        pause: seconds before the first step.
-        seconds_per_step: what a step takes.
+    Captions are HTML: before the first step, which is after a `pause` (seconds), one a step, and after the last.
     """
-    said = json.dumps(list(captions)).replace("<", "\\u003c")
-    settings = f"{said}, {pause:g}, {seconds_per_step:g}, {len(captions) - 2}, {1000 // LOOKS}"
+    texts = json.dumps(list(captions)).replace("<", "\\u003c")
+    settings = f"{texts}, {pause:g}, {seconds_per_step:g}, {len(captions) - 2}, {1000 // LOOKS}"
     return f"<script>({_SCRIPT})({settings});</script>"
 
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Callable, Mapping
+from typing import Any, TypeVar
 
 import viser
 
 from neurosym.errors import InputError
-from neurosym.language.options import options_of
+from neurosym.language.options import options_of, read_options
 from neurosym.pipeline import ORACLES
 from neurosym.registry import domain_names, planner_names, prior_names
 from neurosym.viewer import panels
@@ -18,14 +18,13 @@ from neurosym.viewer.shown import REFUSED, Maker, Query
 
 NO_PRIOR = "none"
 
+T = TypeVar("T", int, float)
+
 
 class Form:
-    """Controls for a query, two buttons and a place for messages; made in the container that is open.
+    """Controls, which say a query at first, two buttons and a place for messages; made in the container that is open.
 
-    Args:
-        gui: where they are made.
-        query: what they say at first.
-        given: names of problems that bear no number in a family, and what makes them.
+    `given` makes problems that bear no number in a family, by their names.
     """
 
     def __init__(self, gui: viser.GuiApi, query: Query, given: Mapping[str, Maker]) -> None:
@@ -70,11 +69,10 @@ class Form:
         domain = self.domain.value
         self.number.disabled = domain in self.given
         try:
-            known = options_of(maker_of(domain, self.given))
+            content = panels.options(domain, options_of(maker_of(domain, self.given)))
         except REFUSED as error:
-            self.takes.content = panels.styled(panels.message(str(error)))
-            return
-        self.takes.content = panels.styled(panels.options(domain, known))
+            content = panels.message(str(error))
+        self.takes.content = panels.styled(content)
 
     def asked(self) -> Query:
         """What the form says.
@@ -82,15 +80,16 @@ class Form:
         Raises:
             InputError: a field that is not what it should be.
         """
+        seconds = self.seconds.value
         return Query(
             domain=self.domain.value,
-            number=None if self.domain.value in self.given else _whole("Problem", self.number.value),
+            number=None if self.domain.value in self.given else _number("Problem", self.number.value, int),
             options=_read_options(self.options.value),
             planner=self.planner.value,
             prior=None if self.prior.value == NO_PRIOR else self.prior.value,
             oracle=self.oracle.value,
-            seed=_whole("Seed", self.seed.value),
-            seconds=_seconds(self.seconds.value),
+            seed=_number("Seed", self.seed.value, int),
+            seconds=_number("Seconds", seconds, float, "a number, or empty for no limit") if seconds.strip() else None,
         )
 
     def say(self, content: str) -> None:
@@ -121,20 +120,11 @@ def _offered(*names: str) -> tuple[str, ...]:
     return tuple(dict.fromkeys(names))
 
 
-def _whole(label: str, text: str) -> int:
+def _number(label: str, text: str, kind: Callable[[str], T], expected: str = "a whole number") -> T:
     try:
-        return int(text)
+        return kind(text)
     except ValueError:
-        raise InputError(f"Expected {label} to be a whole number; got {text!r}.") from None
-
-
-def _seconds(text: str) -> float | None:
-    if not text.strip():
-        return None
-    try:
-        return float(text)
-    except ValueError:
-        raise InputError(f"Expected Seconds to be a number, or empty for no limit; got {text!r}.") from None
+        raise InputError(f"Expected {label} to be {expected}; got {text!r}.") from None
 
 
 def _written(options: Mapping[str, Any]) -> str:
@@ -142,14 +132,6 @@ def _written(options: Mapping[str, Any]) -> str:
 
 
 def _read_options(text: str) -> dict[str, Any]:
-    """``key=value; key=value``: a value that is JSON is read as such, anything else is text."""
-    found: dict[str, Any] = {}
-    for piece in filter(None, (p.strip() for p in text.split(";"))):
-        key, equals, value = (p.strip() for p in piece.partition("="))
-        if not equals or not key.isidentifier():
-            raise InputError(f"Expected Options as key=value; key=value; got {piece!r}.")
-        try:
-            found[key] = json.loads(value)
-        except ValueError:
-            found[key] = value
-    return found
+    """``key=value; key=value``, with spaces where anybody likes them."""
+    pieces = ("=".join(half.strip() for half in piece.split("=", 1)) for piece in text.split(";"))
+    return read_options(filter(None, pieces), "Options as key=value; key=value")

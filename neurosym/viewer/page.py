@@ -41,10 +41,8 @@ PANEL = 420
 class Page:
     """The page of one server; all who look at it see, and steer, the same.
 
-    Args:
-        server: where it is shown.
-        query: what the form for planning again says at first.
-        given: problems that bear no number in a family: name -> what makes them, of options.
+    The form for planning again says the query at first; `given` makes, of options, the problems that bear no number in
+    a family, by their names.
     """
 
     def __init__(self, server: LocalServer, query: Query, given: Mapping[str, Maker] | None = None) -> None:
@@ -69,23 +67,27 @@ class Page:
         """Put a problem with its search on the page, at the beginning of its film."""
         with self._lock:
             self.shown, self.playing = shown, False
-            self.scene.put(shown.timeline)
-            timeline = shown.timeline
-            self.slider.max = max(timeline.n_steps if timeline else 0, 1)
-            self.slider.disabled = self.play.disabled = timeline is None or timeline.n_steps == 0
+            timeline, search = shown.timeline, shown.search
+            n_steps, names = (timeline.n_steps, timeline.names) if timeline else (0, ())
+            self.scene.put(timeline)
+            self.slider.max = max(n_steps, 1)
+            self.slider.disabled = self.play.disabled = n_steps == 0
             assign(self.slider, 0.0)
-            self.part.options = (NO_PART, *(timeline.names if timeline else ()))
+            self.part.options = (NO_PART, *names)
             assign(self.part, NO_PART)
-            assign(self.names, named_at_first(shown.timeline))
-            self._fill(shown)
+            assign(self.names, named_at_first(timeline))
+            table = scores_table(search.scores, shown.problem.actions, search.steps)
+            reference = f"<p><b>Reference</b></p>{panels.pictures(shown.pictures)}"
+            self.prior_tab.content = panels.styled(table + reference)
+            self._list_attempts(0)
+            self.refusal.max, self.refusal.disabled = max(len(search.refusals), 1), not search.refusals
+            assign(self.refusal, 0)
+            self.refusal_text.content = ""
+            self._step_shown = self._facts_for = None
             self._moved(0.0)
 
     def plan(self, query: Query, problem: Problem | None = None) -> None:
-        """Plan in the background; what comes out of it is shown.
-
-        Args:
-            query: what to plan, and how.
-            problem: its problem, where it is made already.
+        """Plan in the background, the problem itself where it is made already; what comes out of it is shown.
 
         Raises:
             InputError: there is no such domain, planner or prior, or a search is under way.
@@ -99,12 +101,9 @@ class Page:
             self.planning = Planning(make, query)
             self.form.refuse("")
             if self.shown is None and problem is not None:
-                self._preview(problem)
-
-    def _preview(self, problem: Problem) -> None:
-        """Show what is there before any step, while the first search goes on."""
-        with contextlib.suppress(*REFUSED):
-            self.scene.put(Timeline(stage(problem, ()), problem.geometry))
+                # What is there before any step, while the first search goes on.
+                with contextlib.suppress(*REFUSED):
+                    self.scene.put(Timeline(stage(problem, ()), problem.geometry))
 
     def close(self) -> None:
         """End the page's thread and any search; the server is left to who made it."""
@@ -131,7 +130,7 @@ class Page:
             self.prior_tab = gui.add_html("")
         with tabs.add_tab("Search"):
             self.refusal = gui.add_slider("Look at", min=0, max=1, step=1, initial_value=0, hint="a refusal, by number")
-            self.refusal_said = gui.add_html("")
+            self.refusal_text = gui.add_html("")
             self.search_tab = gui.add_html("")
         with tabs.add_tab("Part"):
             self.part = gui.add_dropdown("Part", (NO_PART,))
@@ -145,19 +144,6 @@ class Page:
         self.refusal.on_update(lambda _: self._look_at(self.refusal.value))
         self.form.again.on_click(lambda _: self._again())
         self.form.stop.on_click(lambda _: self._stop())
-
-    def _fill(self, shown: Shown) -> None:
-        search = shown.search
-        self.prior_tab.content = panels.styled(
-            scores_table(search.scores, shown.problem.actions, search.steps)
-            + "<p><b>Reference</b></p>"
-            + panels.pictures(shown.pictures)
-        )
-        self._list_attempts(0)
-        self.refusal.max, self.refusal.disabled = max(len(search.refusals), 1), not search.refusals
-        assign(self.refusal, 0)
-        self.refusal_said.content = ""
-        self._step_shown = self._facts_for = None
 
     def _list_attempts(self, around: int) -> None:
         """List attempts: where there are too many, those about a refusal by its number."""
@@ -174,11 +160,9 @@ class Page:
             if shown is None:
                 return
             self.scene.show(t)
-            timeline = shown.timeline
-            now = timeline.step_at(t) if timeline else None
-            key = (now, int(t))
-            if key != self._step_shown:
-                self._step_shown = key
+            now = shown.timeline.step_at(t) if shown.timeline else None
+            if (now, int(t)) != self._step_shown:
+                self._step_shown = now, int(t)
                 self.plan_tab.content = panels.styled(panels.overview(shown) + steps(shown, now))
                 self.caption.content = panels.styled(caption(shown, t))
                 self._tell_facts()
@@ -223,13 +207,13 @@ class Page:
             if shown is None or not 0 <= number <= len(shown.search.refusals):
                 return
             if number == 0:
-                self.refusal_said.content = ""
+                self.refusal_text.content = ""
                 if self.part.value == NO_PART:
                     self.scene.stand_out(None)
                 return
             assign(self.part, NO_PART)
             refusal = shown.search.refusals[number - 1]
-            self.refusal_said.content = panels.styled(looked_at(number, refusal))
+            self.refusal_text.content = panels.styled(looked_at(number, refusal))
             if len(shown.search.refusals) > MOST_REFUSALS:
                 self._list_attempts(number)
             timeline = shown.timeline
@@ -288,9 +272,10 @@ class Page:
             self.planning = None
             self.form.busy(None)
             if planning.shown is None:
-                self.form.refuse(planning.message or "")
+                message = planning.message or ""
+                self.form.refuse(message)
                 if self.shown is None:
-                    self.caption.content = panels.styled(panels.message(planning.message or ""))
+                    self.caption.content = panels.styled(panels.message(message))
                 return
             try:
                 self.show(planning.shown)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
-from typing import Any
 
 import numpy as np
 import viser
@@ -47,35 +46,34 @@ def named_at_first(timeline: Timeline | None) -> bool:
 
 
 class PlanScene:
-    """Parts in a viser scene. Nodes are named by the parts' numbers, since names may hold anything.
+    """Parts in a viser scene; `on_pick` is called with a part's name when it is clicked.
 
-    Args:
-        server: where the scene is.
-        on_pick: called with a part's name when it is clicked.
+    Nodes are named by the parts' numbers, since names may hold anything.
     """
 
     def __init__(self, server: viser.ViserServer, on_pick: Callable[[str], None] | None = None) -> None:
         self.server = server
-        self.timeline: Timeline | None = None
-        self.parts: list[viser.MeshHandle] = []
         self._on_pick = on_pick
-        self._names: list[viser.LabelHandle] = []
-        self._outlines: dict[str, viser.LineSegmentsHandle] = {}
-        self._way: viser.LineSegmentsHandle | None = None
-        self._way_of: int | None = None
-        self._standing_out: Mapping[str, RGB | None] | None = None
-        self._held: frozenset[str] = frozenset()
-        self._colours: list[RGB] = []
+        self._clear(None)
         server.scene.set_up_direction("+z")
         light(server.scene)
+
+    def _clear(self, timeline: Timeline | None) -> None:
+        """Nothing of a timeline is in the scene yet."""
+        self.timeline = timeline
+        self.parts: list[viser.MeshHandle] = []
+        self._names: list[viser.LabelHandle] = []
+        self._outlines: dict[str, viser.LineSegmentsHandle] = {}
+        self._path: viser.LineSegmentsHandle | None = None
+        self._path_step: int | None = None
+        self._standing_out: Mapping[str, RGB | None] | None = None
+        self._held: frozenset[str] = frozenset()
 
     def put(self, timeline: Timeline | None) -> None:
         """Show another timeline from its beginning, or nothing."""
         with self.server.atomic():
             self.server.scene.remove_by_name("/parts")
-            self.timeline, self._standing_out, self._way, self._way_of = timeline, None, None, None
-            self._held = frozenset()
-            self.parts, self._names, self._outlines, self._colours = [], [], {}, []
+            self._clear(timeline)
             if timeline is not None:
                 self._add(timeline)
                 self.show(0.0)
@@ -90,8 +88,9 @@ class PlanScene:
         self._thick = 0.0035 * SIZE * min(1.0, 6.0 / len(assembly) ** 0.5)
         for i, solid in enumerate(solids(assembly)):
             self._add_part(timeline, i, solid)
-        self._ground(timeline)
-        self._look(timeline)
+        low, high = self._to_scene(timeline.bounds())
+        self._ground(timeline, low, high)
+        self._look(low, high)
 
     def _add_part(self, timeline: Timeline, i: int, solid: Solid) -> None:
         """A part's mesh, and under it in the tree its outline, its picture and its name."""
@@ -111,18 +110,11 @@ class PlanScene:
         tag = scene.add_label(f"/parts/{i}/name", name, font_screen_scale=0.9, anchor="center-center", visible=named)
         self.parts.append(node)
         self._names.append(tag)
-        if self._on_pick is not None:
-            node.on_click(self._picker(name))
+        on_pick = self._on_pick
+        if on_pick is not None:
+            node.on_click(lambda _: on_pick(name))
 
-    def _picker(self, name: str) -> Callable[[Any], None]:
-        def picked(_: Any) -> None:
-            if self._on_pick is not None:
-                self._on_pick(name)
-
-        return picked
-
-    def _ground(self, timeline: Timeline) -> None:
-        low, high = self._to_scene(timeline.bounds())
+    def _ground(self, timeline: Timeline, low: Array, high: Array) -> None:
         middle, size = (low + high) / 2, (high - low)[:2] + 0.4 * SIZE
         self.server.scene.add_grid(
             "/parts/ground",
@@ -137,9 +129,8 @@ class PlanScene:
             plane_opacity=1.0 if timeline.staging.assembly.has_table else 0.0,
         )
 
-    def _look(self, timeline: Timeline) -> None:
+    def _look(self, low: Array, high: Array) -> None:
         """Place the cameras as near as they can be and still see all of the film in a square window."""
-        low, high = self._to_scene(timeline.bounds())
         eye, middle = camera_for(low, high)
         camera = self.server.initial_camera
         camera.position, camera.look_at, camera.up = tuple(eye), tuple(middle), (0.0, 0.0, 1.0)
@@ -167,23 +158,23 @@ class PlanScene:
                 self.parts[i].wxyz = now[i, 3:7]
             for i in np.flatnonzero(new[:, 7]):
                 self.parts[i].visible = bool(seen[i])
-            self._show_way(timeline, t)
+            self._show_path(timeline, t)
         self._sent = now
 
-    def _show_way(self, timeline: Timeline, t: float) -> None:
-        """The way of the step under way as a line, which the parts' middle follows; and what is held meanwhile."""
+    def _show_path(self, timeline: Timeline, t: float) -> None:
+        """The path of the step under way as a line, which the parts' middle follows; and what is held meanwhile."""
         step = timeline.step_at(t)
-        if step == self._way_of:
+        if step == self._path_step:
             return
-        self._way_of = step
+        self._path_step = step
         self._hold(() if step is None else timeline.staging.motions[step].held)
-        if self._way is not None:
-            self._way.remove()
-            self._way = None
+        if self._path is not None:
+            self._path.remove()
+            self._path = None
         if step is not None:
-            way = self._to_scene(timeline.path_of(step))
-            pieces = np.stack([way[:-1], way[1:]], axis=1)
-            self._way = self.server.scene.add_line_segments("/parts/way", pieces, _PICKED, thickness=0.008 * SIZE)
+            path = self._to_scene(timeline.path_of(step))
+            pieces = np.stack([path[:-1], path[1:]], axis=1)
+            self._path = self.server.scene.add_line_segments("/parts/way", pieces, _PICKED, thickness=0.008 * SIZE)
 
     def _hold(self, names: Collection[str]) -> None:
         """Outline what is held, boldly and in its colour; what was held before is as it was."""

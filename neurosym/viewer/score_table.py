@@ -47,8 +47,8 @@ def scores_table(scores: OrderScores | None, actions: Sequence[str], taken: Sequ
             left_out = f" {len(actions) - len(kept)} actions of at most {rest:.2g} at any step are left out."
         place = {int(j): k for k, j in enumerate(kept)}
         drawn = _as_cells(P[:, kept], [actions[j] for j in kept], [(i, place[j]) for i, j in marks])
-    said = "The darker, the likelier the prior holds an action (column) at a step (row); a ring marks what was taken."
-    return f"{drawn}<p class='quiet'>{said}{shared}{left_out}</p>"
+    legend = "The darker, the likelier the prior holds an action (column) at a step (row); a ring marks what was taken."
+    return f"{drawn}<p class='quiet'>{legend}{shared}{left_out}</p>"
 
 
 def _by_class(
@@ -79,33 +79,29 @@ def _as_cells(P: NDArray[np.float64], names: Sequence[str], marks: Sequence[tupl
     head = 18 if upright else 6 * longest + 8
     font = min(11.0, 0.7 * side)
     svg = []
+
+    def square(i: int, j: int, margin: float, look: str) -> str:
+        x, y, size = 24 + j * side + margin, head + i * side + margin, side - 1 - 2 * margin
+        return f"<rect x='{x:.1f}' y='{y:.1f}' width='{size:.1f}' height='{size:.1f}' {look}"
+
     for j, name in enumerate(names):
-        x = 24 + (j + 0.5) * side
+        x, y = 24 + (j + 0.5) * side, head - 5 + (0.0 if upright else 0.35 * font)
         turn = "" if upright else f" transform='rotate(-90 {x:.1f} {head - 5})'"
         anchor = "middle" if upright else "start"
-        y = head - 5 if upright else head - 5 + 0.35 * font
         svg.append(f"<text x='{x:.1f}' y='{y:.1f}' text-anchor='{anchor}'{turn}>{escape(name)}</text>")
     for i in range(rows):
         svg.append(f"<text x='18' y='{head + (i + 0.65) * side:.1f}' text-anchor='end'>{i + 1}</text>")
-        for j in range(columns):
+        for j, name in enumerate(names):
             p = float(P[i, j])
-            x, y = 24 + j * side, head + i * side
-            tip = f"step {i + 1}, {escape(names[j])}: {p:.3g}"
-            svg.append(
-                f"<rect x='{x:.1f}' y='{y:.1f}' width='{side - 1:.1f}' height='{side - 1:.1f}' fill='{_shade(p)}'>"
-                f"<title>{tip}</title></rect>"
-            )
+            tip = f"<title>step {i + 1}, {escape(name)}: {p:.3g}</title>"
+            svg.append(square(i, j, 0.0, f"fill='{_shade(p)}'>{tip}</rect>"))
             if side >= 26 and p >= 0.005:
-                ink = "#fff" if p > 0.45 else "#222"
                 svg.append(
-                    f"<text x='{x + side / 2:.1f}' y='{y + 0.62 * side:.1f}' text-anchor='middle' fill='{ink}' "
-                    f"pointer-events='none'>{f'{p:.2f}'.removeprefix('0') if p < 0.995 else '1'}</text>"
+                    f"<text x='{24 + (j + 0.5) * side:.1f}' y='{head + (i + 0.62) * side:.1f}' text-anchor='middle' "
+                    f"fill='{'#fff' if p > 0.45 else '#222'}' pointer-events='none'>"
+                    f"{f'{p:.2f}'.removeprefix('0') if p < 0.995 else '1'}</text>"
                 )
-    for i, j in marks:
-        svg.append(
-            f"<rect x='{24 + j * side + 1:.1f}' y='{head + i * side + 1:.1f}' width='{side - 3:.1f}' "
-            f"height='{side - 3:.1f}' fill='none' stroke='{_TAKEN}' stroke-width='2.5' rx='3'/>"
-        )
+    svg.extend(square(i, j, 1.0, f"fill='none' stroke='{_TAKEN}' stroke-width='2.5' rx='3'/>") for i, j in marks)
     width, height = 26 + columns * side, head + rows * side + 2
     return (
         f"<svg width='{width:.0f}' height='{height:.0f}' viewBox='0 0 {width:.0f} {height:.0f}' "

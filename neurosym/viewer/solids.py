@@ -22,13 +22,7 @@ SAME = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class Solid:
-    """A part to draw.
-
-    Attributes:
-        vertices: float64 (n, 3), in the world.
-        faces: int64 (m, 3), outward.
-        outline: float64 (k, 2, 3): its sharp edges.
-    """
+    """A part to draw, in the world: float64 (n, 3) vertices, int64 (m, 3) outward faces, float64 (k, 2, 3) sharp edges."""
 
     vertices: Array
     faces: NDArray[np.int64]
@@ -88,5 +82,4 @@ def _outline(vertices: Array, faces: NDArray[np.int64]) -> Array:
     pairs = count == 2
     first, second = owner[start[pairs]], owner[start[pairs] + 1]
     smooth[pairs] = np.einsum("nd,nd->n", normal[first], normal[second]) > np.cos(np.radians(SHARP))
-    found: Array = vertices[edges[start[~smooth]]]
-    return found
+    return np.asarray(vertices[edges[start[~smooth]]])

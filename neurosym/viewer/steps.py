@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from html import escape
 from typing import TYPE_CHECKING
 
@@ -30,8 +29,9 @@ def caption(shown: Shown, t: float) -> str:
         text = name if shown.search.solved else f"{name}: no plan. The tab Plan says why, as far as it is known."
     elif now is not None:
         action, motion = timeline.staging.plan[now], timeline.staging.motions[now]
-        said = f"{_who(action, motion)} {_verb(motion)} {escape(motion.course)}"
-        text = f"Step {now + 1} of {total}: {said}{_meanwhile(motion)}"
+        moves = f"{_who(action, motion)} {_verb(motion)} {escape(motion.course)}"
+        held = _held(motion, f"<span style='{_HELD}'>{escape(some(motion.held))}</span>")
+        text = f"Step {now + 1} of {total}: {moves}{escape(_making_way(motion))}{held}"
     elif t <= 0:
         text = f"{name}: before the first of {total} steps"
     else:
@@ -39,17 +39,11 @@ def caption(shown: Shown, t: float) -> str:
     return f"<div style='min-height:2.7em;padding-top:4px'>{text}</div>"
 
 
-def steps(shown: Shown, now: int | None, *, all_of_them: bool = False) -> str:
-    """The steps, numbered from 1; the one under way, number `now` from 0, stands out.
-
-    Args:
-        shown: what is shown.
-        now: the step under way, or None.
-        all_of_them: whether even a long list is whole while a step of it is under way.
-    """
+def steps(shown: Shown, now: int | None) -> str:
+    """The steps, numbered from 1; number `now` (from 0) is under way and stands out; a long list is cut round it."""
     staging = shown.timeline.staging if shown.timeline else None
     total = len(shown.search.steps)
-    first, end = (0, total) if now is None or all_of_them else _in_sight(now, total)
+    first, end = (0, total) if now is None else _in_sight(now, total)
     guessed = staging.guessed if staging else frozenset()
     mixed = 0 < len(guessed) < total
     rows = []
@@ -76,22 +70,19 @@ def in_short(action: str, motion: StepMotion) -> str:
     if not others and len(motion.parts) > 1:
         others = list(motion.parts)
     together = f", together with {some(others)}" if others else ""
-    held = f", while {some(motion.held)} {_is(motion.held)} held" if motion.held else ""
-    return f"{motion.course}{together}{_making_way(motion)}{held}"
+    return f"{motion.course}{together}{_making_way(motion)}{_held(motion, some(motion.held))}"
 
 
 def _none(shown: Shown) -> str:
     """Why there is no plan; nothing where there is one."""
     if shown.search.solved:
         return ""
-    why = "".join(f"<li>{escape(sentence)}</li>" for sentence in shown.search.why_not)
-    because = f"<p><b>Why nothing more can be done</b></p><ul>{why}</ul>" if why else ""
+    reasons = "".join(f"<li>{escape(sentence)}</li>" for sentence in shown.search.why_not)
+    because = f"<p><b>Why nothing more can be done</b></p><ul>{reasons}</ul>" if reasons else ""
     if shown.search.refusals:
         because += "<p>The tab Search has each refused attempt; look at one to see it in the view.</p>"
-    shows = (
-        "No plan: the longest prefix that works is shown." if shown.search.steps else "No plan, and no step to show."
-    )
-    return f"<p class='note'>{shows}</p>{because}"
+    rest = ": the longest prefix that works is shown." if shown.search.steps else ", and no step to show."
+    return f"<p class='note'>No plan{rest}</p>{because}"
 
 
 def _in_sight(now: int, total: int) -> tuple[int, int]:
@@ -112,22 +103,13 @@ def _who(action: str, motion: StepMotion) -> str:
 
 
 def _verb(motion: StepMotion) -> str:
-    one = len(motion.parts) == 1
-    if motion.arrives:
-        return "comes" if one else "come"
-    return "leaves" if one else "leave"
+    return ("come" if motion.arrives else "leave") + ("s" if len(motion.parts) == 1 else "")
 
 
-def _meanwhile(motion: StepMotion) -> str:
-    """What else happens in a step, as HTML: what makes way, and what is held, in the colour of its outline."""
-    names = f"<span style='{_HELD}'>{escape(some(motion.held))}</span>"
-    held = f", while {names} {_is(motion.held)} held" if motion.held else ""
-    return f"{escape(_making_way(motion))}{held}"
+def _held(motion: StepMotion, names: str) -> str:
+    """What is held meanwhile, by the `names` of the parts as they are to be written."""
+    return f", while {names} {'is' if len(motion.held) == 1 else 'are'} held" if motion.held else ""
 
 
 def _making_way(motion: StepMotion) -> str:
     return f", {some(motion.making_way)} making way" if motion.making_way else ""
-
-
-def _is(names: Sequence[str]) -> str:
-    return "is" if len(names) == 1 else "are"

@@ -41,6 +41,7 @@ class Timeline:
         staging: what happens.
         geometry: what answers questions about its assembly.
         names: names of the parts, in the order of every array here.
+        bounds_at_rest, centres: float64 (n_parts, 2, 3) and (n_parts, 3): of the parts in the work, and their middle.
         n_steps: the last time.
         where: uint8 (n_steps + 1, n_parts): `ABSENT`, `IN_PLACE` or `APART` at each whole time.
         shifts: float64 (n_steps + 1, n_parts, 3): how far each part is from its rest in the work at each whole time.
@@ -52,6 +53,8 @@ class Timeline:
         known = geometry is not None and geometry.assembly is staging.assembly
         self.geometry = geometry if geometry and known else AssemblyGeometry(staging.assembly)
         self.names = staging.assembly.names
+        self.bounds_at_rest = staging.assembly.part_bounds
+        self.centres = np.asarray(self.bounds_at_rest.mean(axis=1))
         self.n_steps = len(staging.motions)
         self.backwards = bool(staging.motions) and all(m.arrives for m in staging.motions)
         # From here on, times and steps are those of the film as it is made, where `_played` has turned them.
@@ -79,17 +82,6 @@ class Timeline:
             where[step + 1, movers] = IN_PLACE if motion.arrives else APART
             shifts[step + 1, movers] = 0.0 if motion.arrives else places[step]
         return where, shifts
-
-    @cached_property
-    def bounds_at_rest(self) -> Array:
-        """float64 (n_parts, 2, 3): bounds of the parts, in the work."""
-        return self.staging.assembly.part_bounds
-
-    @cached_property
-    def centres(self) -> Array:
-        """float64 (n_parts, 3): the middle of each part's bounds, at rest in the work."""
-        middle: Array = self.bounds_at_rest.mean(axis=1)
-        return middle
 
     def step_at(self, t: float) -> int | None:
         """Number of the step that is under way at time t, or None at a whole time."""
@@ -126,8 +118,7 @@ class Timeline:
         """bool (n_parts,): which parts are to be seen at time t."""
         t = self._within(t)
         step = int(np.floor(t))
-        seen: NDArray[np.bool_] = self.where[step] != ABSENT
-        return seen if t == step else seen | (self.where[step + 1] != ABSENT)
+        return np.asarray((self.where[step] != ABSENT) | (self.where[int(np.ceil(t))] != ABSENT))
 
     def bounds(self) -> Array:
         """float64 (2, 3): bounds of what is to be seen at whole times, and at the outer ends of all paths."""
@@ -141,11 +132,10 @@ class Timeline:
         return np.stack([all_seen[:, 0].min(axis=0), all_seen[:, 1].max(axis=0)])
 
     def path_of(self, step: int) -> Array:
-        """float64 (k, 3): the way of the middle of what moves in a step, out from where it rests."""
+        """float64 (k, 3): the path of the middle of what moves in a step, out from where it rests."""
         number = int(self._played(step + 0.5))
         path, middle = self._motions[number].tracks[0].poses, self._middle(number)
-        way: Array = path[:, :3, :3] @ middle + path[:, :3, 3] + self._base(number)
-        return way
+        return np.asarray(path[:, :3, :3] @ middle + path[:, :3, 3] + self._base(number))
 
     def _within(self, t: float) -> float:
         if not np.isfinite(t):
@@ -158,14 +148,12 @@ class Timeline:
 
     def _base(self, number: int) -> Array:
         """float64 (3,): how far from the work the path of a motion begins: 0, or where its group was set down."""
-        base: Array = self._shifts[number + self._motions[number].arrives, self._movers[number][0]]
-        return base
+        return np.asarray(self._shifts[number + self._motions[number].arrives, self._movers[number][0]])
 
     def _middle(self, number: int) -> Array:
         """float64 (3,): the middle of what a motion moves, at rest in the work."""
         boxes = self.bounds_at_rest[self._movers[number]]
-        middle: Array = (boxes[:, 0].min(axis=0) + boxes[:, 1].max(axis=0)) / 2
-        return middle
+        return np.asarray((boxes[:, 0].min(axis=0) + boxes[:, 1].max(axis=0)) / 2)
 
     def _under_way(self, number: int, share: float) -> dict[str, Array]:
         """Name -> float64 (4, 4): the motions of the parts that move, when `share` of a step's time has passed."""
@@ -205,8 +193,7 @@ def floor_of(assembly: Assembly) -> float:
 def _rows_before(assembly: Assembly, groups: Sequence[NDArray[np.int64]], backwards: bool) -> Array:
     """Shifts, float64 (n_groups, 3), that set groups of parts down in rows before the work, towards -y, left to right.
 
-    Args:
-        groups: numbers of the parts, in the order of the rows, or `backwards` against it.
+    The groups, numbers of parts, are in the order of the rows, or `backwards` against it.
     """
     shifts = np.zeros((len(groups), 3))
     if not len(groups):
