@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -15,20 +14,6 @@ if TYPE_CHECKING:
     from neurosym.geometry.assembly import Assembly
     from neurosym.geometry.readers.references import Reading
     from neurosym.language.problem import Problem
-
-
-class Paths(StrEnum):
-    """Which ways out are looked for."""
-
-    straight = "straight"
-    any = "any"
-
-
-class Up(StrEnum):
-    """What is up in a file."""
-
-    y = "y"
-    z = "z"
 
 
 AssemblyPath = Annotated[
@@ -43,7 +28,7 @@ class FileOptions:
     units: Annotated[
         str | None, typer.Option(metavar="U", help="What a length of 1 is in the files: mm, m, in, ...")
     ] = None
-    up: Annotated[Up | None, typer.Option(help="What is up in the files; default z, in glTF y.")] = None
+    up: Annotated[Literal["y", "z"] | None, typer.Option(help="What is up in the files; default z, in glTF y.")] = None
     touch: Annotated[
         float | None,
         typer.Option(
@@ -66,7 +51,7 @@ class FileOptions:
         """As the library takes them."""
         from neurosym.geometry.readers.references import Reading
 
-        return Reading(**{**vars(self), "up": None if self.up is None else self.up.value})
+        return Reading(**vars(self))
 
 
 @dataclass(frozen=True)
@@ -77,7 +62,8 @@ class RemovalOptions:
         str | None, typer.Option(metavar="D", help="Straight ways out: +z,-x or axes (default), contacts, a number.")
     ] = None
     paths: Annotated[
-        Paths | None, typer.Option(help="Straight lines only (default), or any path where none is free.")
+        Literal["straight", "any"] | None,
+        typer.Option(help="Straight lines only (default), or any path where none is free."),
     ] = None
     groups: Annotated[
         bool | None, typer.Option("--groups", help="Let several parts leave together, and come apart later.")
@@ -90,8 +76,7 @@ class RemovalOptions:
 
     def given(self) -> dict[str, Any]:
         """Those that were given, as `problem` of the domain "assembly" takes them."""
-        named = {**vars(self), "paths": None if self.paths is None else self.paths.value}
-        return {name: value for name, value in named.items() if value is not None and value != []}
+        return {name: value for name, value in vars(self).items() if value is not None and value != []}
 
 
 def load_assembly(path: Path, files: FileOptions) -> Assembly:

@@ -8,9 +8,8 @@ import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -23,21 +22,7 @@ if TYPE_CHECKING:
     from rich.console import Console, RenderableType
     from rich.progress import Progress as Bars
 
-
-class Oracle(StrEnum):
-    """What answers attempts."""
-
-    geometry = "geometry"
-    physics = "physics"
-
-
-class Pictures(StrEnum):
-    """Style of the pictures a prior reads."""
-
-    clean = "clean"
-    varied = "varied"
-
-
+Style = Literal["clean", "varied"]
 DomainName = Annotated[str, typer.Argument(metavar="DOMAIN", help="Problem family; `neurosym list` names them.")]
 PriorNames = Annotated[
     list[str] | None, typer.Option(metavar="Q", help="Name of a prior, a weights file, or `none`. May be repeated.")
@@ -45,8 +30,8 @@ PriorNames = Annotated[
 CollapseRule = Annotated[
     str | None, typer.Option(metavar="RULE", help="Rule of collapse (soma: cubes, strict, rigid).")
 ]
-OracleName = Annotated[Oracle, typer.Option(help="What answers attempts.")]
-PictureStyle = Annotated[Pictures, typer.Option(help="Style of the pictures.")]
+OracleName = Annotated[Literal["geometry", "physics"], typer.Option(help="What answers attempts.")]
+PictureStyle = Annotated[Style, typer.Option(help="Style of the pictures.")]
 Split = Annotated[int, typer.Option(min=0, metavar="S", help="Which random split into train and test.")]
 FamilyOptions = Annotated[
     list[str] | None, typer.Option(metavar="KEY=VALUE", help="An option of the family's problems. May be repeated.")
@@ -75,7 +60,7 @@ class SearchOptions:
         list[str] | None, typer.Option(metavar="A,B", help="A must come before B. May be repeated.")
     ] = None
     removed: Annotated[list[str] | None, typer.Option(metavar="V", help="Is gone already. May be repeated.")] = None
-    oracle: OracleName = Oracle.geometry
+    oracle: OracleName = "geometry"
     seed: Annotated[int, typer.Option(min=0, help="Breaks ties; the same seed gives the same plan.")] = 0
     seconds: Annotated[float | None, typer.Option(help="Budget: wall-clock time.")] = None
     attempts: Annotated[int | None, typer.Option(help="Budget: questions to the oracle.")] = None

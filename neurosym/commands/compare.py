@@ -14,9 +14,7 @@ from neurosym.commands.common import (
     CollapseRule,
     DomainName,
     FamilyOptions,
-    Oracle,
     OracleName,
-    Pictures,
     PictureStyle,
     PriorNames,
     Split,
@@ -47,12 +45,12 @@ def compare(
         str, typer.Option(metavar="test|train|all|N", help="Which; N means the first N of the test part.")
     ] = "test",
     split: Split = 0,
-    pictures: PictureStyle = Pictures.clean,
+    pictures: PictureStyle = "clean",
     planner: Annotated[list[str] | None, typer.Option(metavar="P", help="Name of a planner. May be repeated.")] = None,
     prior: PriorNames = None,
     collapse: CollapseRule = None,
     option: FamilyOptions = None,
-    oracle: OracleName = Oracle.geometry,
+    oracle: OracleName = "geometry",
     seeds: Annotated[int, typer.Option(min=1, metavar="K", help="Solve each problem K times.")] = 1,
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Folder for the table, the figure and the journal.")
@@ -80,14 +78,14 @@ def compare(
     folder = out if out is not None or as_json else Path("out") / f"compare-{domain}"
     processes = workers or cores()
     # A family whose problems have no such option is not told the default.
-    style = None if pictures is Pictures.clean else pictures.value
+    style = None if pictures == "clean" else pictures
     comparison = Comparison(
         domain=domain,
         numbers=_numbers(family, problems, split, own),
         planners=_once(planner or PLANNERS),
         priors=_once(prior or PRIORS),
         options=problem_options(family, collapse=collapse, pictures=style) | of_problems,
-        oracle=oracle.value,
+        oracle=oracle,
         seeds=seeds,
     )
     comparison, scores = _scores(comparison, asked=bool(prior), workers=processes)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from neurosym.commands.assemblies import AssemblyPath, FileOptions, Paths, RemovalOptions, problem_at
+from neurosym.commands.assemblies import AssemblyPath, FileOptions, RemovalOptions, problem_at
 from neurosym.commands.common import AsJson, print_json
 from neurosym.errors import InputError
 
@@ -33,13 +33,13 @@ def inspect(path: AssemblyPath, files: FileOptions, removal: RemovalOptions, as_
 
     problem = problem_at(path, files, replace(removal, paths=None).given())
     inspection = inspect_problem(problem)
-    level = _level(problem) if removal.paths is Paths.any else None
+    level = _level(problem) if removal.paths == "any" else None
     if as_json:
         answer = {"path": str(path), "units": problem.world.units, **inspection.as_json()}
-        print_json(answer if removal.paths is not Paths.any else {**answer, "level": level})
+        print_json(answer if removal.paths != "any" else {**answer, "level": level})
         return
     _show(problem, inspection)
-    if removal.paths is Paths.any:
+    if removal.paths == "any":
         print("No level is known: no moves of groups separate it." if level is None else f"Level {level}.")
 
 

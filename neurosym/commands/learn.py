@@ -11,9 +11,9 @@ import typer
 from neurosym.commands.common import (
     DomainName,
     FamilyOptions,
-    Pictures,
     PictureStyle,
     Split,
+    Style,
     family_options,
     progress_bar,
     progress_bars,
@@ -32,7 +32,7 @@ def demos(
     recipe: Annotated[str, typer.Option(metavar="full|paper", help="Which labels.")] = "full",
     part: Annotated[str, typer.Option(metavar="train|test|all", help="Of which problems.")] = "train",
     split: Split = 0,
-    pictures: PictureStyle = Pictures.clean,
+    pictures: PictureStyle = "clean",
     seed: Annotated[int, typer.Option(min=0, help="Of the pictures.")] = 0,
     option: FamilyOptions = None,
 ) -> None:
@@ -55,7 +55,7 @@ def train(
     ] = None,
     split: Split = 0,
     seed: Annotated[int, typer.Option(min=0, metavar="K", help="Of the pictures and the training.")] = 0,
-    pictures: PictureStyle = Pictures.clean,
+    pictures: PictureStyle = "clean",
     epochs: Annotated[int | None, typer.Option(min=1, help="Default the recipe's.")] = None,
     encoder: Annotated[
         str | None, typer.Option(metavar="NAME", help="small (default) or paper, the paper's CNN.")
@@ -69,7 +69,7 @@ def train(
 
     _check_suffix(out, ".safetensors")
     load_domain(domain)
-    if demos_file is not None and (split or option or pictures is not Pictures.clean):
+    if demos_file is not None and (split or option or pictures != "clean"):
         raise InputError("Expected --split, --pictures and --option only without --demos, whose file has it all.")
     learner: Any = load_prior(prior, **({"encoder": encoder} if encoder else {}))
     if not (hasattr(learner, "fit") and hasattr(learner, "save")):
@@ -88,7 +88,7 @@ def train(
     with warnings.catch_warnings():
         warnings.showwarning = lambda message, *_, **__: say(f"Note: {message}")
         _fit(learner, given, seed=seed, epochs=epochs, device=device, checkpoint=checkpoint, resume=resume)
-    made_here = {"split": split, "pictures": pictures.value, "seed": seed, **family_options(option)}
+    made_here = {"split": split, "pictures": pictures, "seed": seed, **family_options(option)}
     learner.save(out, notes=made_here if demos_file is None else {"file": demos_file.name})
     checkpoint.unlink(missing_ok=True)
     figures = learner.header.get("training", {}) if hasattr(learner, "header") else {}
@@ -114,7 +114,7 @@ def _fit(learner: Any, given: Demonstrations, **options: Any) -> None:
 
 
 def _demonstrations(
-    domain: str, part: str, split: int, recipe: str, pictures: Pictures, seed: int, options: dict[str, Any]
+    domain: str, part: str, split: int, recipe: str, pictures: Style, seed: int, options: dict[str, Any]
 ) -> Demonstrations:
     from neurosym.registry import load_domain
 
@@ -124,7 +124,7 @@ def _demonstrations(
         raise InputError(f"Expected options that demonstrations of {domain!r} take; got {', '.join(strange)}.")
     with progress_bar("demonstrations") as progress:
         return family.demonstrations(
-            part, split=split, recipe=recipe, style=pictures.value, seed=seed, progress=progress, **options
+            part, split=split, recipe=recipe, style=pictures, seed=seed, progress=progress, **options
         )
 
 

@@ -12,7 +12,6 @@ import typer
 from neurosym.commands.assemblies import FileOptions, RemovalOptions, load_assembly
 from neurosym.commands.common import (
     AsJson,
-    Pictures,
     PictureStyle,
     SearchOptions,
     family_options,
@@ -50,7 +49,7 @@ def plan(
     number: Annotated[int | None, typer.Option("--problem", metavar="N", help="Number of the problem.")] = None,
     planner: Annotated[str | None, typer.Option(metavar="P", help="Default backtracking; with --k best-first.")] = None,
     search: SearchOptions,
-    pictures: PictureStyle = Pictures.clean,
+    pictures: PictureStyle = "clean",
     expansions: Annotated[int | None, typer.Option(help="Budget: states expanded.")] = None,
     k: Annotated[int | None, typer.Option(metavar="K", help="The K best plans, the likeliest first.")] = None,
     files: FileOptions,
@@ -71,7 +70,7 @@ def plan(
     cells = search.own_cells()
     path = _path(what, number, cells)
     family = load_domain("assembly" if path else what)
-    style = None if pictures is Pictures.clean else pictures.value
+    style = None if pictures == "clean" else pictures
     options = problem_options(family, **search.of_problem(), pictures=style)
     options |= removal.given() | family_options(search.option)
     source: dict[str, Any] = {}
@@ -90,7 +89,7 @@ def plan(
         "planner": planner or ("backtracking" if k is None else "best-first"),
         "prior": None if prior == NO_PRIOR else prior,
         "budget": budget,
-        "oracle": search.oracle.value,
+        "oracle": search.oracle,
     }
     results = plans(problem, k=k, rng=np.random.default_rng(search.seed), **settings)
     if not results:

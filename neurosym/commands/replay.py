@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -14,13 +13,6 @@ from neurosym.support.words import joined
 
 if TYPE_CHECKING:
     from neurosym.simulation.replay_report import ReplayReport, StepReplay
-
-
-class Bodies(StrEnum):
-    """What moves as one."""
-
-    rigid = "rigid"
-    cubes = "cubes"
 
 
 PlanPath = Annotated[Path, typer.Argument(metavar="PLAN", help="What `neurosym plan --out` wrote.")]
@@ -33,7 +25,8 @@ def replay(
         bool, typer.Option("--pull", help="Drag parts by a grip, against friction, instead of taking them by hand.")
     ] = False,
     bodies: Annotated[
-        Bodies | None, typer.Option(help="Rigid parts, or independent cubes. Default: the problem's rule.")
+        Literal["rigid", "cubes"] | None,
+        typer.Option(help="Rigid parts, or independent cubes. Default: the problem's rule."),
     ] = None,
     friction: Annotated[
         float | None, typer.Option(min=0.0, help="Between any two parts. Default: the problem's.")
@@ -54,7 +47,7 @@ def replay(
         saved.plan,
         saved.motions,
         pulled=pull,
-        bodies=None if bodies is None else bodies.value,
+        bodies=bodies,
         friction=friction,
         threshold=threshold,
         window=gui,

@@ -8,26 +8,19 @@ from contextlib import redirect_stdout
 from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import typer
 
-from neurosym.commands.common import Pictures, progress_bar, say
+from neurosym.commands.common import progress_bar, say
 from neurosym.errors import UnknownNameError
 
 
-class Scale(StrEnum):
-    """How large."""
+class Pictures(StrEnum):
+    """Style of pictures: typer takes a list of these, and none of literals."""
 
-    quick = "quick"
-    paper = "paper"
-
-
-class EngineName(StrEnum):
-    """Where the work is done."""
-
-    local = "local"
-    ray = "ray"
+    clean = "clean"
+    varied = "varied"
 
 
 ExperimentName = Annotated[
@@ -39,12 +32,15 @@ def reproduce(
     name: ExperimentName,
     seeds: Annotated[int | None, typer.Option(min=1, metavar="K", help="Splits and trainings, 0 to K - 1.")] = None,
     scale: Annotated[
-        Scale, typer.Option(help="Within 15 minutes on two cores, or of the paper's sizes and seeds.")
-    ] = Scale.quick,
+        Literal["quick", "paper"],
+        typer.Option(help="Within 15 minutes on two cores, or of the paper's sizes and seeds."),
+    ] = "quick",
     workers: Annotated[
         int | None, typer.Option(min=1, metavar="N", help="Most at a time. Default one a processor; ray: its own.")
     ] = None,
-    engine: Annotated[EngineName, typer.Option(help="Processes here, or an existing Ray cluster.")] = EngineName.local,
+    engine: Annotated[
+        Literal["local", "ray"], typer.Option(help="Processes here, or an existing Ray cluster.")
+    ] = "local",
     address: Annotated[
         str | None, typer.Option(metavar="HOST:PORT", help="Of the Ray cluster. Default the one on this machine.")
     ] = None,
@@ -67,21 +63,21 @@ def reproduce(
     from neurosym.experiments import imitation
     from neurosym.experiments import reproduce as planning
 
-    folder = out or Path("out") / f"reproduce-{name}{'' if scale is Scale.quick else f'-{scale.value}'}"
-    given: dict[str, Any] = {"workers": workers, "engine": engine.value, "address": address, "say": say}
+    folder = out or Path("out") / f"reproduce-{name}{'' if scale == 'quick' else f'-{scale}'}"
+    given: dict[str, Any] = {"workers": workers, "engine": engine, "address": address, "say": say}
     if name != "soma" and name not in imitation.study_names():
         raise UnknownNameError("experiment", name, ["soma", *imitation.study_names()])
     # Ray says on stdout that a node is lost; stdout belongs to the answer.
     with redirect_stdout(sys.stderr):
         if name == "soma":
-            what = planning.soma_experiment(scale.value)
+            what = planning.soma_experiment(scale)
             styles = tuple(style.value for style in pictures or ()) or what.styles
             what = replace(what, splits=seeds or what.splits, styles=styles, methods=tuple(prior or what.methods))
             what = replace(what, epochs=epochs, repeats=repeats)
             with progress_bar("trainings and comparisons") as progress:
                 page = planning.report(what, planning.reproduce(what, folder, progress=progress, **given))
         else:
-            study = imitation.study(name, scale.value)
+            study = imitation.study(name, scale)
             study = replace(study, seeds=seeds or study.seeds, methods=tuple(prior or study.methods))
             with progress_bar("trials") as progress:
                 results = imitation.reproduce_study(study, folder, epochs=epochs, progress=progress, **given)

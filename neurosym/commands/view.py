@@ -65,7 +65,7 @@ def view(
         options=options | removal.given() | family_options(search.option),
         planner=planner,
         prior=None if search.prior == "none" else search.prior,
-        oracle=search.oracle.value,
+        oracle=search.oracle,
         seed=search.seed,
         seconds=search.seconds,
         attempts=search.attempts,

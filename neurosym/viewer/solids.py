@@ -22,7 +22,7 @@ SAME = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class Solid:
-    """A part to draw, in the world: float64 (n, 3) vertices, int64 (m, 3) outward faces, float64 (k, 2, 3) sharp edges."""
+    """A part in the world: float64 (n, 3) vertices, int64 (m, 3) outward faces, float64 (k, 2, 3) sharp edges."""
 
     vertices: Array
     faces: NDArray[np.int64]
