@@ -29,8 +29,6 @@ from neurosym.language.options import options_of
 from neurosym.planning.staging import stage
 from neurosym.testing import burrs
 from neurosym.viewer import panels, score_table
-from neurosym.viewer.attempts import BECAUSE, FEW, MOST_COUNTED, MOST_REFUSALS, attempts, most_refused
-from neurosym.viewer.attempts import REFUSED as TRIED
 from neurosym.viewer.export import PAUSE, SECONDS_PER_STEP, _with_panel
 from neurosym.viewer.facts import part_facts
 from neurosym.viewer.follow import follower
@@ -38,7 +36,20 @@ from neurosym.viewer.planning import Planning, problem_maker
 from neurosym.viewer.shown import Query, Search, Shown
 from neurosym.viewer.solids import solids
 from neurosym.viewer.sources import open_source
-from neurosym.viewer.steps import AFTER, BEFORE, HELD, caption, steps
+from neurosym.viewer.steps import (
+    AFTER,
+    BECAUSE,
+    BEFORE,
+    FEW,
+    HELD,
+    MOST_COUNTED,
+    MOST_REFUSALS,
+    TRIED,
+    attempts,
+    caption,
+    most_refused,
+    steps,
+)
 from neurosym.viewer.timeline import ABSENT, APART, IN_PLACE, ON_PATH, Timeline
 
 UP = (0.0, 0.0, 1.0)
@@ -828,7 +839,6 @@ def test_the_model_loads_no_viser():
         "solids",
         "panels",
         "steps",
-        "attempts",
         "follow",
         "score_table",
         "look",

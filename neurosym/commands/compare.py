@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -82,8 +82,8 @@ def compare(
     comparison = Comparison(
         domain=domain,
         numbers=_numbers(family, problems, split, own),
-        planners=_once(planner or PLANNERS),
-        priors=_once(prior or PRIORS),
+        planners=tuple(dict.fromkeys(planner or PLANNERS)),
+        priors=tuple(dict.fromkeys(prior or PRIORS)),
         options=problem_options(family, collapse=collapse, pictures=style) | of_problems,
         oracle=oracle,
         seeds=seeds,
@@ -113,10 +113,6 @@ def _numbers(family: ProblemFamily, problems: str, split: int, options: Mapping[
     if problems not in PARTS:
         raise UnknownNameError("part", problems, PARTS, hint="A number N above 0 takes the first N of the test part.")
     return tuple(family.numbers(problems, split=split, **own))
-
-
-def _once(names: Sequence[str]) -> tuple[str, ...]:
-    return tuple(dict.fromkeys(names))
 
 
 def _scores(comparison: Comparison, *, asked: bool, workers: int) -> tuple[Comparison, dict[str, Any]]:

@@ -131,14 +131,10 @@ def fcl_works() -> str:
     import numpy as np
 
     from neurosym.geometry.contact.collision import box_object, box_patch, collide, distance
-
-    def at(x: float) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
-        pose = np.eye(4)
-        pose[0, 3] = x
-        return pose
+    from neurosym.geometry.rigid_motions import shifted
 
     unit = np.ones(3)
-    still, near, far = box_object(unit, at(0.0)), box_object(unit, at(0.9)), box_object(unit, at(2.0))
+    still, near, far = (box_object(unit, shifted(np.array([x, 0, 0]))) for x in (0.0, 0.9, 2.0))
     if not collide(still, near) or collide(still, far):
         raise RuntimeError("boxes that overlap, or that do not, are told apart wrongly")
     patch = box_patch(still, near)

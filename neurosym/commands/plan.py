@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -20,7 +20,7 @@ from neurosym.commands.common import (
     write_json,
 )
 from neurosym.errors import InputError
-from neurosym.language.options import check_options
+from neurosym.language.options import made
 from neurosym.language.problem_family import ProblemFamily
 from neurosym.plan_files.writing import problem_part, result_part
 from neurosym.support.words import joined
@@ -81,7 +81,7 @@ def plan(
         source = {} if cells is None else {"cells": cells}
     else:
         assembly = load_assembly(path, files)
-        problem = _made(family.problem, assembly, options | {"name": path.resolve().name}, family.name)
+        problem = made(family.problem, assembly, options=options | {"name": path.resolve().name}, whose=family.name)
         source = {"assembly": reference(path, files.reading(), assembly)}
     prior = search.prior or (NO_PRIOR if path is None else UNTRAINED)
     budget = Budget(seconds=search.seconds, attempts=search.attempts, expansions=expansions)
@@ -135,19 +135,11 @@ def _problem(
     if (number is None) == (cells is None):
         raise InputError("Expected either --problem N or --cells FILE, one of them.")
     if cells is None:
-        return _made(family.problem, number, options, family.name)
-    make = getattr(family, "problem_from_cells", None)
+        return made(family.problem, number, options=options, whose=family.name)
+    make: Callable[..., Problem] | None = getattr(family, "problem_from_cells", None)
     if make is None:
         raise InputError(f"Expected a domain of polycube puzzles (soma) for --cells; {family.name!r} is none.")
-    return _made(make, cells, options, family.name)
-
-
-def _made(make: Callable[..., Problem], given: Any, options: dict[str, Any], whose: str) -> Problem:
-    check_options(make, options, whose)
-    try:
-        return make(given, **options)
-    except TypeError as error:
-        raise InputError(f"Expected options that problems of {whose!r} take; {error}.") from None
+    return made(make, cells, options=options, whose=family.name)
 
 
 def _show(problem: Problem, results: Sequence[PlanResult], answer: dict[str, Any]) -> None:

@@ -59,17 +59,10 @@ def view(
     if export is not None:
         check_name(export)
     options = {name: value for name, value in search.of_problem().items() if value is not None}
-    query = Query(
-        domain=target,
-        number=number,
-        options=options | removal.given() | family_options(search.option),
-        planner=planner,
-        prior=None if search.prior == "none" else search.prior,
-        oracle=search.oracle,
-        seed=search.seed,
-        seconds=search.seconds,
-        attempts=search.attempts,
-    )
+    options |= removal.given() | family_options(search.option)
+    prior = None if search.prior == "none" else search.prior
+    limits = (search.seconds, search.attempts)
+    query = Query(target, number, options, planner, prior, search.oracle, search.seed, *limits)
     check_query(query)
     source = open_source(query, search.own_cells(), files.reading())
     if search.prior is None and source.saved is None:
@@ -101,8 +94,8 @@ def _serve(source: Source, shown: Shown | None, *, host: str, port: int, browser
             page.plan(source.query, source.problem)
         else:
             page.show(shown)
-        where = "localhost" if host in ("0.0.0.0", "::") else f"[{host}]" if ":" in host else host
-        address = f"http://{where}:{server.get_port()}"
+        name = "localhost" if host in ("0.0.0.0", "::") else f"[{host}]" if ":" in host else host
+        address = f"http://{name}:{server.get_port()}"
         print(f"{address} shows {source.problem.name}. Ctrl+C ends it.", flush=True)
         if host not in LOOPBACKS:
             say(f"Note: {host} is not this machine alone; who reaches the page can plan with it.")

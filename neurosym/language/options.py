@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import inspect
 import json
-from collections.abc import Callable, Iterable
-from typing import Any
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, TypeVar
 
 from neurosym.errors import InputError
+
+T = TypeVar("T")
 
 
 def options_of(make: Callable[..., Any]) -> dict[str, Any] | None:
@@ -34,6 +36,19 @@ def check_options(make: Callable[..., Any], given: Iterable[str], whose: str) ->
     if known is not None and wrong:
         takes = f"options of {whose!r} among {', '.join(known)}" if known else f"no option for {whose!r}"
         raise InputError(f"Expected {takes}; got {', '.join(wrong)}.")
+
+
+def made(make: Callable[..., T], *given: Any, options: Mapping[str, Any], whose: str) -> T:
+    """What a function makes of options.
+
+    Raises:
+        InputError: options that it does not take, together or at all.
+    """
+    check_options(make, options, whose)
+    try:
+        return make(*given, **options)
+    except TypeError as error:
+        raise InputError(f"Expected options that problems of {whose!r} take; {error}.") from None
 
 
 def read_options(texts: Iterable[str], expected: str) -> dict[str, Any]:

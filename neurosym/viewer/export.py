@@ -10,13 +10,12 @@ import numpy as np
 from neurosym.errors import InputError
 from neurosym.support.files import write_text
 from neurosym.viewer import panels
-from neurosym.viewer.attempts import attempts, most_refused
 from neurosym.viewer.follow import follower
 from neurosym.viewer.scene import PlanScene
 from neurosym.viewer.score_table import scores_table
 from neurosym.viewer.server import LocalServer
 from neurosym.viewer.shown import Shown
-from neurosym.viewer.steps import caption, steps
+from neurosym.viewer.steps import attempts, caption, most_refused, steps
 
 #: Scene updates a second of the recording, and seconds that a step takes.
 RATE, SECONDS_PER_STEP = 15, 1.5

@@ -14,8 +14,6 @@ from neurosym.errors import InputError
 from neurosym.language.problem import Problem
 from neurosym.planning.staging import stage
 from neurosym.viewer import panels
-from neurosym.viewer.attempts import BECAUSE, MOST_REFUSALS, attempts, looked_at, most_refused
-from neurosym.viewer.attempts import REFUSED as TRIED
 from neurosym.viewer.facts import part_facts
 from neurosym.viewer.form import Form, assign
 from neurosym.viewer.planning import Planning, check_query, problem_maker
@@ -23,7 +21,7 @@ from neurosym.viewer.scene import PlanScene, named_at_first
 from neurosym.viewer.score_table import scores_table
 from neurosym.viewer.server import LocalServer
 from neurosym.viewer.shown import REFUSED, Maker, Query, Shown
-from neurosym.viewer.steps import caption, steps
+from neurosym.viewer.steps import BECAUSE, MOST_REFUSALS, TRIED, attempts, caption, looked_at, most_refused, steps
 from neurosym.viewer.timeline import Timeline
 
 _log = logging.getLogger(__name__)
@@ -60,8 +58,6 @@ class Page:
         self._build()
         self._clock = threading.Thread(target=self._run, name="neurosym view", daemon=True)
         self._clock.start()
-
-    # -- what others call -------------------------------------------------------------------------------------
 
     def show(self, shown: Shown) -> None:
         """Put a problem with its search on the page, at the beginning of its film."""
@@ -111,8 +107,6 @@ class Page:
         self._stop()
         self._clock.join(5.0)
 
-    # -- the panel --------------------------------------------------------------------------------------------
-
     def _build(self) -> None:
         gui = self.server.gui
         gui.configure_theme(show_logo=False, show_share_button=False, brand_color=(0, 114, 178))
@@ -150,8 +144,6 @@ class Page:
         if self.shown is not None:
             search = self.shown.search
             self.search_tab.content = panels.styled(most_refused(search) + attempts(search, around))
-
-    # -- the film ---------------------------------------------------------------------------------------------
 
     def _moved(self, t: float) -> None:
         """Show time t, and what the panel says of it."""
@@ -244,8 +236,6 @@ class Page:
             self.part_tab.content = panels.styled(panels.facts(part_facts(timeline.geometry, name, there)))
         except REFUSED as error:
             self.part_tab.content = panels.styled(panels.message(str(error)))
-
-    # -- planning again ---------------------------------------------------------------------------------------
 
     def _again(self) -> None:
         try:

@@ -11,7 +11,7 @@ from functools import partial
 from typing import Any
 
 from neurosym.errors import InputError, UnknownNameError
-from neurosym.language.options import check_options
+from neurosym.language.options import check_options, made
 from neurosym.language.problem import Problem
 from neurosym.pipeline import ORACLES, advice, solve
 from neurosym.planning.budget import Budget
@@ -133,13 +133,7 @@ def problem_maker(query: Query, given: Mapping[str, Maker]) -> Callable[[], Prob
             raise InputError(f"Expected the number of a problem of {query.domain!r}; got none.")
         make = partial(make, query.number)
 
-    def problem() -> Problem:
-        try:
-            return make(**query.options)
-        except TypeError as error:
-            raise InputError(f"Expected options that {query.domain!r} takes; {error}.") from None
-
-    return problem
+    return partial(made, make, options=query.options, whose=query.domain)
 
 
 def check_query(query: Query) -> None:
