@@ -29,6 +29,7 @@ from neurosym.commands.common import (
 from neurosym.errors import InputError, UnknownNameError
 from neurosym.experiments.engines import cores
 from neurosym.language.problem_family import ProblemFamily
+from neurosym.support.files import write_text
 
 if TYPE_CHECKING:
     from neurosym.experiments.benchmark import Comparison, Outcome
@@ -66,7 +67,8 @@ def compare(
     Without --out, files go to out/compare-DOMAIN (with --json nowhere).
     """
     from neurosym.experiments.benchmark import Comparison, Outcome, image_blind, run
-    from neurosym.experiments.reporting import rows
+    from neurosym.experiments.reporting import figure_of, report, rows, write_csv
+    from neurosym.plotting import save
     from neurosym.registry import load_domain
 
     if out is not None and out.exists() and not out.is_dir():
@@ -95,7 +97,9 @@ def compare(
     outcome = Outcome(comparison, runs, *image_blind(comparison, split=split))
     table = rows(outcome)
     if folder:
-        _write(outcome, table, folder)
+        write_csv(table, folder / "results.csv")
+        write_text(folder / "results.md", report(outcome))
+        save(figure_of(outcome), folder / "iterations.png")
     if as_json:
         print_json({"rows": table})
         return
@@ -127,26 +131,16 @@ def _scores(comparison: Comparison, *, asked: bool, workers: int) -> tuple[Compa
     return dataclasses.replace(comparison, priors=tuple(scores)), scores
 
 
-def _write(outcome: Outcome, table: list[Row], folder: Path) -> None:
-    from neurosym.experiments.reporting import figure_of, report, write_csv
-    from neurosym.plotting import save
-    from neurosym.support.files import write_text
-
-    write_csv(table, folder / "results.csv")
-    write_text(folder / "results.md", report(outcome))
-    save(figure_of(outcome), folder / "iterations.png")
-
-
 def _show(outcome: Outcome, given: list[Row], family: ProblemFamily, folder: Path | None) -> None:
     from neurosym.experiments.reporting import table
 
     comparison = outcome.comparison
-    shown = table(given)
-    out = console(shown)
+    rendered = table(given)
+    out = console(rendered)
     options = ", ".join(f"{key} {value}" for key, value in comparison.options.items())
     seeds = f", {comparison.seeds} seeds each" if comparison.seeds > 1 else ""
     out.print(f"{comparison.domain}: {len(comparison.numbers)} problems{seeds}; {options}, oracle {comparison.oracle}")
-    out.print(shown)
+    out.print(rendered)
     if outcome.image_blind is not None:
         out.print(
             f"Without looking at any picture: the best fixed order ({' '.join(outcome.image_blind_order)}) "

@@ -92,7 +92,9 @@ def doctor(as_json: AsJson = False) -> None:
 
 def examine() -> Iterator[Finding]:
     """All findings, one by one: versions, names, and whether each heavy dependency answers a question it must know."""
-    yield _python()
+    version = platform.python_version()
+    system = f"{version} on {platform.system()} {platform.machine()}"
+    yield Finding("installed", "python", sys.version_info >= (3, 11), system, "Use Python 3.11 or later (best 3.11).")
     yield from _versions()
     claimed = metadata.packages_distributions()
     for package in PACKAGES:
@@ -103,15 +105,15 @@ def examine() -> Iterator[Finding]:
 
 def claim(package: str, claimed: Mapping[str, list[str]]) -> Finding:
     """Whether a package is ours alone: no other distribution claims its name, and it is imported from our folder."""
-    others = sorted({d for d in claimed.get(package, []) if _canonical(d) != DISTRIBUTION})
+    others = sorted({d for d in claimed.get(package, []) if re.sub(r"[-_.]+", "-", d).lower() != DISTRIBUTION})
     if others:
         remedy = f"Uninstall it (pip uninstall {' '.join(others)}), then install {DISTRIBUTION} again."
         return Finding("names", package, False, f"also claimed by {', '.join(others)}", remedy)
     spec = importlib.util.find_spec(package)
     home = Path(__file__).resolve().parent.parent.parent
-    found = None if spec is None or spec.origin is None else Path(spec.origin).resolve().parent.parent
-    if found != home:
-        where = "not found" if found is None else f"imported from {found}, while neurosym is in {home}"
+    origin = None if spec is None or spec.origin is None else Path(spec.origin).resolve().parent.parent
+    if origin != home:
+        where = "not found" if origin is None else f"imported from {origin}, while neurosym is in {home}"
         remedy = f"Remove or rename what hides it, or install {DISTRIBUTION} again."
         return Finding("names", package, False, where, remedy)
     return Finding("names", package, True, "ours alone")
@@ -174,16 +176,10 @@ _PACKAGE = {"FCL": "python-fcl", "PyBullet": "pybullet", "OMPL": "ompl"}
 
 def _checks() -> dict[str, Callable[[], str]]:
     """Ours, and those that other packages declare: torch is the business of the learned priors."""
-    found: dict[str, Callable[[], str]] = {"FCL": fcl_works, "PyBullet": pybullet_works, "OMPL": _ompl}
+    checks: dict[str, Callable[[], str]] = {"FCL": fcl_works, "PyBullet": pybullet_works, "OMPL": _ompl}
     for entry in metadata.entry_points(group=CHECKS):
-        found[entry.name] = lambda entry=entry: str(entry.load()())  # type: ignore[misc]
-    return found
-
-
-def _python() -> Finding:
-    version = platform.python_version()
-    said = f"{version} on {platform.system()} {platform.machine()}"
-    return Finding("installed", "python", sys.version_info >= (3, 11), said, "Use Python 3.11 or later (best 3.11).")
+        checks[entry.name] = lambda entry=entry: str(entry.load()())  # type: ignore[misc]
+    return checks
 
 
 def _versions() -> Iterator[Finding]:
@@ -204,7 +200,3 @@ def _versions() -> Iterator[Finding]:
             yield Finding("installed", name, True, metadata.version(name))
         except metadata.PackageNotFoundError:
             yield Finding("installed", name, False, "missing", f'pip install "{requirement}"')
-
-
-def _canonical(name: str) -> str:
-    return re.sub(r"[-_.]+", "-", name).lower()

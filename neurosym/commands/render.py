@@ -110,18 +110,18 @@ def _at_rest(what: str, number: int | None, files: FileOptions, options: dict[st
     from neurosym.registry import domain_names, load_domain
 
     if what not in domain_names() and Path(what).exists():
-        assembly = load_assembly(Path(what), files)
-        return Staging(assembly, assembly.names, ()), Path(what).resolve().name
-    files.reading().refuse(f"{what!r} is a problem family")
-    problem = load_domain(what).problem(number or 0, **options)
-    world = problem.world if isinstance(problem.world, Assembly) else getattr(problem.world, "assembly", None)
-    if not isinstance(world, Assembly):
-        raise InputError(f"Expected a problem of rigid parts; {problem.name!r} has none to draw.")
-    return Staging(world, world.names, ()), problem.name
+        world, name = load_assembly(Path(what), files), Path(what).resolve().name
+    else:
+        files.reading().refuse(f"{what!r} is a problem family")
+        problem = load_domain(what).problem(number or 0, **options)
+        world, name = getattr(problem.world, "assembly", problem.world), problem.name
+        if not isinstance(world, Assembly):
+            raise InputError(f"Expected a problem of rigid parts; {name!r} has none to draw.")
+    return Staging(world, world.names, ()), name
 
 
 def _two(text: str, pattern: str, expected: str) -> tuple[float, float]:
-    found = re.fullmatch(pattern, text.replace(" ", ""))
-    if found is None:
+    match = re.fullmatch(pattern, text.replace(" ", ""))
+    if match is None:
         raise InputError(f"Expected {expected}; got {text!r}.")
-    return float(found[1]), float(found[2])
+    return float(match[1]), float(match[2])

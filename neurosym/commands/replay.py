@@ -15,11 +15,8 @@ if TYPE_CHECKING:
     from neurosym.simulation.replay_report import ReplayReport, StepReplay
 
 
-PlanPath = Annotated[Path, typer.Argument(metavar="PLAN", help="What `neurosym plan --out` wrote.")]
-
-
 def replay(
-    path: PlanPath,
+    path: Annotated[Path, typer.Argument(metavar="PLAN", help="What `neurosym plan --out` wrote.")],
     gui: Annotated[bool, typer.Option("--gui", help="Show it in PyBullet's window, in real time.")] = False,
     pull: Annotated[
         bool, typer.Option("--pull", help="Drag parts by a grip, against friction, instead of taking them by hand.")
@@ -67,10 +64,10 @@ def _show(name: str, report: ReplayReport) -> None:
     from rich.table import Table
 
     came = bool(report.steps) and all(step.arrives for step in report.steps)
-    way = "pulled along by a grip" if report.pulled else f"{'placed' if came else 'taken'} by hand"
+    by = "pulled along by a grip" if report.pulled else f"{'placed' if came else 'taken'} by hand"
     what = "rigid parts" if report.bodies == "rigid" else "independent cubes"
     under = "" if report.gravity else ", no gravity"
-    table = Table(title=escape(f"{name}: {what}, {way}{under}"), title_justify="left")
+    table = Table(title=escape(f"{name}: {what}, {by}{under}"), title_justify="left")
     table.add_column("step", justify="right")
     table.add_column("action")
     table.add_column(f"largest shift{f' ({report.unit})' if report.unit else ''}", justify="right")
@@ -94,8 +91,8 @@ def _show(name: str, report: ReplayReport) -> None:
 def _did(step: StepReplay) -> str:
     """The action; whoever else moves; what is held."""
     others = [part for part in step.parts if part != step.action] if step.action in step.parts else []
-    said = f"{step.action} with {joined(others)}" if others else step.action
-    return f"{said} ({joined(step.held)} held)" if step.held else said
+    held = f" ({joined(step.held)} held)" if step.held else ""
+    return f"{step.action}{f' with {joined(others)}' if others else ''}{held}"
 
 
 def _rest(step: StepReplay) -> str:

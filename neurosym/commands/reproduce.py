@@ -23,13 +23,10 @@ class Pictures(StrEnum):
     varied = "varied"
 
 
-ExperimentName = Annotated[
-    str, typer.Argument(metavar="NAME", help="soma, tower, tower-by-sequence, unseen, variable or scrabble.")
-]
-
-
 def reproduce(
-    name: ExperimentName,
+    name: Annotated[
+        str, typer.Argument(metavar="NAME", help="soma, tower, tower-by-sequence, unseen, variable or scrabble.")
+    ],
     seeds: Annotated[int | None, typer.Option(min=1, metavar="K", help="Splits and trainings, 0 to K - 1.")] = None,
     scale: Annotated[
         Literal["quick", "paper"],

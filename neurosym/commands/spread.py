@@ -15,11 +15,8 @@ from typing import Any, get_type_hints
 def spread(command: Callable[..., None]) -> Callable[..., None]:
     """A command whose parameters that are dataclasses are replaced by their fields, each with its own default.
 
-    Args:
-        command: a function; its dataclasses have defaults for all fields, and no two of its options share a name.
-
-    Returns:
-        What the command line calls: it takes keyword arguments only, and hands each dataclass over made.
+    What the command line calls takes keyword arguments only, and hands each dataclass over made. All fields have
+    defaults, and no two options share a name.
     """
     hints = get_type_hints(command, include_extras=True)
     groups: dict[str, tuple[type[Any], list[str]]] = {}
@@ -27,7 +24,7 @@ def spread(command: Callable[..., None]) -> Callable[..., None]:
     for parameter in inspect.signature(command).parameters.values():
         kind = hints[parameter.name]
         if isinstance(kind, type) and is_dataclass(kind):
-            own = [_option(kind, field.name) for field in fields(kind)]
+            own = _options(kind)
             groups[parameter.name] = kind, [option.name for option in own]
             parameters += own
         else:
@@ -44,9 +41,11 @@ def spread(command: Callable[..., None]) -> Callable[..., None]:
     return spread_out
 
 
-def _option(kind: type[Any], name: str) -> inspect.Parameter:
-    field = next(f for f in fields(kind) if f.name == name)
-    if field.default is MISSING:
-        raise TypeError(f"Expected a default for every option of {kind.__name__}; {name} has none.")
-    annotation = get_type_hints(kind, include_extras=True)[name]
-    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=field.default, annotation=annotation)
+def _options(kind: type[Any]) -> list[inspect.Parameter]:
+    hints, options = get_type_hints(kind, include_extras=True), []
+    for field in fields(kind):
+        if field.default is MISSING:
+            raise TypeError(f"Expected a default for every option of {kind.__name__}; {field.name} has none.")
+        annotation, keyword = hints[field.name], inspect.Parameter.KEYWORD_ONLY
+        options.append(inspect.Parameter(field.name, keyword, default=field.default, annotation=annotation))
+    return options

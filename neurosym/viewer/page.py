@@ -211,10 +211,9 @@ class Page:
             timeline = shown.timeline
             if timeline is None:
                 return
-            depth = len(refusal.after)
-            if shown.search.steps[:depth] == refusal.after:
+            if shown.search.steps[: len(refusal.after)] == refusal.after:
                 self._play(False)
-                assign(self.slider, float(depth))
+                assign(self.slider, float(len(refusal.after)))
             colours: dict[str, tuple[int, int, int] | None] = dict.fromkeys(refusal.because, BECAUSE)
             moved = {a: m.parts for a, m in zip(timeline.staging.plan, timeline.staging.motions)}
             self.scene.stand_out(colours | dict.fromkeys(moved.get(refusal.action, (refusal.action,)), TRIED))

@@ -20,10 +20,7 @@ _OWN_PAGE = re.compile(r"https?://(127\.0\.0\.1|localhost|\[::1\])(:\d+)?")
 class LocalServer(viser.ViserServer):
     """A viser server that prints nothing, opens no tunnel and, on loopback, hears no other site's page.
 
-    Args:
-        host: which interface to listen on.
-        port: which port; the next free one where it is taken, and any where it is 0.
-        label: title of the panel.
+    Port 0 is any; where a port is taken, it is the next free one. The label is the title of the panel.
     """
 
     def __init__(self, host: str = "127.0.0.1", port: int = 0, label: str | None = None) -> None:

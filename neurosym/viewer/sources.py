@@ -44,9 +44,7 @@ class Source:
 def open_source(query: Query, cells: Mapping[str, Any] | None = None, reading: Reading | None = None) -> Source:
     """Open the domain, or the file at the path, that `query.domain` names; a path wins where no problem is named.
 
-    Args:
-        cells: a puzzle of the user's own for a domain of polycubes, {name: [(x, y, z), ...]}.
-        reading: how an assembly at a path is read.
+    The domain may get cells, {name: [(x, y, z), ...]}, for a puzzle of the user's own; an assembly its reading.
 
     Raises:
         UnknownNameError: neither a domain nor a path.
@@ -111,15 +109,14 @@ def _plan_at(path: Path, query: Query) -> Source:
 
 
 def _assembly_at(path: Path, query: Query, reading: Reading) -> Source:
-    family, called = load_domain(ASSEMBLY), path.resolve().name
+    family = load_domain(ASSEMBLY)
 
     @wraps(family.problem)  # whose options it takes
     def make(**options: Any) -> Problem:
-        return family.problem(reading.load(path), **{"name": called, **options})
+        return family.problem(reading.load(path), **{"name": path.resolve().name, **options})
 
-    name = _name_for(path)
-    query = replace(query, domain=name)
-    given: dict[str, Maker] = {name: make}
+    query = replace(query, domain=_name_for(path))
+    given: dict[str, Maker] = {query.domain: make}
     return Source(query, problem_maker(query, given)(), given, usual_prior=UNTRAINED)
 
 
