@@ -841,7 +841,6 @@ def test_the_model_loads_no_viser():
         "steps",
         "follow",
         "score_table",
-        "look",
         "planning",
         "sources",
     )

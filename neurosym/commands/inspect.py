@@ -69,10 +69,8 @@ def count(
     else:
         least = "" if counted.exact else "At least "
         print(f"{least}{counted.orders:,} orders ({counted.states:,} states, {counted.seconds:.2f} s)")
-    if counted.orders is None:
-        raise typer.Exit(Status.OUT_OF_BUDGET.exit_code)
-    if not counted.exact:
-        raise typer.Exit(Status.GAVE_UP.exit_code)
+    if not counted.exact or counted.orders is None:
+        raise typer.Exit((Status.OUT_OF_BUDGET if counted.orders is None else Status.GAVE_UP).exit_code)
 
 
 def export(

@@ -20,7 +20,7 @@ from neurosym.viewer.planning import Planning, check_query, problem_maker
 from neurosym.viewer.scene import PlanScene, named_at_first
 from neurosym.viewer.score_table import scores_table
 from neurosym.viewer.server import LocalServer
-from neurosym.viewer.shown import REFUSED, Maker, Query, Shown
+from neurosym.viewer.shown import REFUSED, Maker, Query, Search, Shown
 from neurosym.viewer.steps import BECAUSE, MOST_REFUSALS, TRIED, attempts, caption, looked_at, most_refused, steps
 from neurosym.viewer.timeline import Timeline
 
@@ -75,7 +75,7 @@ class Page:
             table = scores_table(search.scores, shown.problem.actions, search.steps)
             reference = f"<p><b>Reference</b></p>{panels.pictures(shown.pictures)}"
             self.prior_tab.content = panels.styled(table + reference)
-            self._list_attempts(0)
+            self._list_attempts(search, 0)
             self.refusal.max, self.refusal.disabled = max(len(search.refusals), 1), not search.refusals
             assign(self.refusal, 0)
             self.refusal_text.content = ""
@@ -139,11 +139,9 @@ class Page:
         self.form.again.on_click(lambda _: self._again())
         self.form.stop.on_click(lambda _: self._stop())
 
-    def _list_attempts(self, around: int) -> None:
+    def _list_attempts(self, search: Search, around: int) -> None:
         """List attempts: where there are too many, those about a refusal by its number."""
-        if self.shown is not None:
-            search = self.shown.search
-            self.search_tab.content = panels.styled(most_refused(search) + attempts(search, around))
+        self.search_tab.content = panels.styled(most_refused(search) + attempts(search, around))
 
     def _moved(self, t: float) -> None:
         """Show time t, and what the panel says of it."""
@@ -207,7 +205,7 @@ class Page:
             refusal = shown.search.refusals[number - 1]
             self.refusal_text.content = panels.styled(looked_at(number, refusal))
             if len(shown.search.refusals) > MOST_REFUSALS:
-                self._list_attempts(number)
+                self._list_attempts(shown.search, number)
             timeline = shown.timeline
             if timeline is None:
                 return

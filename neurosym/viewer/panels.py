@@ -110,8 +110,9 @@ def options(domain: str, known: Mapping[str, Any] | None) -> str:
 
 def _default(value: object) -> str:
     """What an option is where nobody says, if that says anything."""
-    plain = isinstance(value, str | bool | int | float)
-    return f" ({escape(value if isinstance(value, str) else json.dumps(value))})" if plain and value != "" else ""
+    if value == "" or not isinstance(value, str | bool | int | float):
+        return ""
+    return f" ({escape(value if isinstance(value, str) else json.dumps(value))})"
 
 
 def message(text: str) -> str:

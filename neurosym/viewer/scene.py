@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Collection, Mapping
 
 import numpy as np
@@ -9,7 +10,6 @@ import viser
 from numpy.typing import NDArray
 
 from neurosym.simulation.scene import part_colours
-from neurosym.viewer.look import FIELD_OF_VIEW, camera_for, light
 from neurosym.viewer.solids import Solid, solids
 from neurosym.viewer.steps import HELD
 from neurosym.viewer.timeline import Timeline, floor_of
@@ -32,12 +32,15 @@ HELD_BY = 3.0
 #: Turns a picture, which faces along -z with its top at -y, so that it lies face up with its top at +y.
 _UPWARD = (0.0, 1.0, 0.0, 0.0)
 
+#: The camera's field of view (radians, top to bottom), where it looks from (the front, a little from the right, from
+#: above), and how much more than all that is ever seen it takes in.
+FIELD_OF_VIEW, FROM, MARGIN = 0.7, np.array([0.35, -0.75, 0.56]), 1.05
+
+#: Light: colours (0..255) of the sky and of what the ground throws back, with their strength; strength of the sun, and
+#: where it stands. The viewer's film curve makes bright colours pale, so that no face may get more than about 4 in all.
+SKY, SUN, SUN_FROM = ((255, 255, 255), (165, 165, 170), 2.2), 2.0, np.array([-0.35, -0.6, 1.0])
+
 _EDGE, _PICKED = (45, 45, 45), (213, 94, 0)
-
-
-def _rgb(colour: tuple[float, float, float]) -> RGB:
-    r, g, b = (round(255 * share) for share in colour)
-    return r, g, b
 
 
 def named_at_first(timeline: Timeline | None) -> bool:
@@ -84,7 +87,8 @@ class PlanScene:
         self._sent = np.full((len(assembly), 8), np.nan)
         self.scale = SIZE / float((high - low).max())
         self.origin = np.array([*(low[:2] + high[:2]) / 2, floor_of(assembly)])
-        self._colours = [_rgb(colour) for colour in part_colours(timeline.staging).values()]
+        colours = part_colours(timeline.staging).values()
+        self._colours = [(round(255 * r), round(255 * g), round(255 * b)) for r, g, b in colours]
         self._thick = 0.0035 * SIZE * min(1.0, 6.0 / len(assembly) ** 0.5)
         for i, solid in enumerate(solids(assembly)):
             self._add_part(timeline, i, solid)
@@ -96,9 +100,8 @@ class PlanScene:
         """A part's mesh, and under it in the tree its outline, its picture and its name."""
         assembly, scene = timeline.staging.assembly, self.server.scene
         name, middle = assembly.names[i], timeline.centres[i]
-        r, g, b = self._colours[i]
         vertices, outline = (solid.vertices - middle) * self.scale, (solid.outline - middle) * self.scale
-        node = scene.add_mesh_simple(f"/parts/{i}", vertices, solid.faces, color=(r, g, b), flat_shading=True)
+        node = scene.add_mesh_simple(f"/parts/{i}", vertices, solid.faces, color=self._colours[i], flat_shading=True)
         if len(outline):
             self._outlines[name] = scene.add_line_segments(f"/parts/{i}/edges", outline, _EDGE, thickness=self._thick)
         if name in timeline.staging.tops:
@@ -204,3 +207,29 @@ class PlanScene:
         with self.server.atomic():
             for tag in self._names:
                 tag.visible = visible
+
+
+def light(scene: viser.SceneApi) -> None:
+    """Light a scene so that a part's colour is that of the pictures, and its faces are told apart."""
+    scene.configure_default_lights(enabled=False)
+    scene.configure_environment_map(None)
+    sky, ground, strength = SKY
+    scene.add_light_hemisphere(
+        "/lights/sky", sky_color=sky, ground_color=ground, intensity=strength, position=(0.0, 0.0, 5.0)
+    )
+    x, y, z = (5.0 * SUN_FROM / np.linalg.norm(SUN_FROM)).tolist()
+    scene.add_light_directional("/lights/sun", intensity=SUN, cast_shadow=True, position=(x, y, z))
+
+
+def camera_for(low: Array, high: Array) -> tuple[Array, Array]:
+    """Where a camera stands and what it looks at, float64 (3,) each: as near as it can be and still see all of a box.
+
+    The box is in the scene, float64 (3,) each corner, and all seen in a square window.
+    """
+    middle, back = (low + high) / 2, FROM / np.linalg.norm(FROM)
+    right = np.cross([0.0, 0.0, 1.0], back)
+    right /= np.linalg.norm(right)
+    axes = np.stack([right, np.cross(back, right), back], axis=1)
+    corners = (np.array(list(itertools.product(*zip(low, high)))) - middle) @ axes
+    away = corners[:, 2] + np.abs(corners[:, :2]).max(axis=1) * MARGIN / np.tan(FIELD_OF_VIEW / 2)
+    return middle + float(away.max()) * back, middle

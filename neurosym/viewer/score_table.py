@@ -22,13 +22,7 @@ _INK, _TAKEN = np.array([0, 90, 140]), "#D55E00"
 
 
 def scores_table(scores: OrderScores | None, actions: Sequence[str], taken: Sequence[str]) -> str:
-    """A prior's order scores, steps by actions: the darker, the likelier; what was taken at each step has a ring.
-
-    Args:
-        scores: of a prior, float64 (n_steps, n_actions) as `log_prob`.
-        actions: names of the columns.
-        taken: names of the actions that the plan took, step by step.
-    """
+    """A prior's order scores, steps by actions: the darker, the likelier; what the plan took has a ring."""
     if scores is None:
         return "<p>Planned without a prior.</p>"
     P, shared = np.exp(scores.log_prob), ""

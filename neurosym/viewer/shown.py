@@ -48,15 +48,9 @@ class Query:
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """What a search knew and did.
+    """What a search knew and did: `steps` are its plan or the longest prefix that works, with a motion each, or none.
 
-    Attributes:
-        steps: names of the actions that are played: the plan, or the longest prefix that works.
-        motions: one a step, as `PlanResult.motions` has them, or nothing.
-        refusals: refused attempts in order.
-        counts: figures by name, for people.
-        settings: planner, prior and oracle in a few words.
-        why_not: sentences that say why there is no plan, where the problem can tell.
+    The refusals are in order; figures (`counts`), settings and reasons why there is no plan are for people to read.
     """
 
     steps: tuple[str, ...]
@@ -115,12 +109,9 @@ def _settings(planner: object, prior: object, oracle: object) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Shown:
-    """A problem and a search, ready to be looked at.
+    """A problem and a search, ready to be looked at; the timeline is None where the problem has no parts in space.
 
-    Attributes:
-        timeline: the film, or None where the problem has no parts in space.
-        pictures: the observation, uint8 (V, H, W, 3), or None.
-        notes: what cannot be shown, and why.
+    Pictures, the observation, are uint8 (V, H, W, 3) or None; notes say what cannot be shown, and why.
     """
 
     problem: Problem

@@ -25,13 +25,10 @@ PUZZLE = "your puzzle"
 
 @dataclass(frozen=True, eq=False)
 class Source:
-    """What there is to look at.
+    """What there is to look at: a problem, and its plan where a file holds one (`saved`), with what is asked at first.
 
-    Attributes:
-        query: what the page asks for at first.
-        given: what bears no number in a family: name on the page -> what makes it, of options.
-        saved: the plan, where a file holds one.
-        usual_prior: the prior that it is planned with where nobody names one.
+    `given` makes, of options, what bears no number in a family, by its name on the page; `usual_prior` is that with
+    which it is planned where nobody names one.
     """
 
     query: Query
