@@ -29,11 +29,11 @@ from neurosym.language.options import options_of
 from neurosym.planning.staging import stage
 from neurosym.testing import burrs
 from neurosym.viewer import panels, score_table
+from neurosym.viewer.exhibit import Exhibit, Query, Search
 from neurosym.viewer.export import PAUSE, SECONDS_PER_STEP, _with_panel
 from neurosym.viewer.facts import part_facts
 from neurosym.viewer.follow import follower
 from neurosym.viewer.planning import Planning, problem_maker
-from neurosym.viewer.shown import Query, Search, Shown
 from neurosym.viewer.solids import solids
 from neurosym.viewer.sources import open_source
 from neurosym.viewer.steps import (
@@ -75,12 +75,12 @@ def film(soma):
 
 
 @pytest.fixture(scope="module")
-def shown():
+def exhibit():
     query = Query("soma", 17, RIGID, "best-first", "random")
     planning = Planning(problem_maker(query, {}), query)
     assert planning.wait(60)
     assert planning.message is None
-    return planning.shown
+    return planning.exhibit
 
 
 class Slow:
@@ -374,10 +374,10 @@ def test_facts_speak_of_the_parts_that_are_there():
 # -- panels -------------------------------------------------------------------------------------------------------
 
 
-def test_panels_escape_what_names_hold(shown):
+def test_panels_escape_what_names_hold(exhibit):
     evil = "<img src=x onerror=alert(1)>"
     search = replace(
-        shown.search,
+        exhibit.search,
         steps=(evil,),
         settings=evil,
         sentence=evil,
@@ -385,7 +385,7 @@ def test_panels_escape_what_names_hold(shown):
     )
     scores = ns.OrderScores.uniform(1, [evil])
     world = ns.Assembly.from_cells({evil: [(0, 0, 0)], "b": [(0, 0, 1)]})
-    nasty = replace(shown, search=search, timeline=None, notes=(evil,))
+    nasty = replace(exhibit, search=search, timeline=None, notes=(evil,))
     texts = [
         panels.overview(nasty),
         steps(nasty, 0),
@@ -404,46 +404,46 @@ def test_panels_escape_what_names_hold(shown):
     assert follower(["</script>"] * 3, 1.0, 1.5).count("</script>") == 1
 
 
-def changed(shown, plan, motions, guessed=(), **change):
-    """`shown` with the steps of a plan of other motions, each in a search that found it."""
-    assembly = shown.timeline.staging.assembly
+def changed(exhibit, plan, motions, guessed=(), **change):
+    """`exhibit` with the steps of a plan of other motions, each in a search that found it."""
+    assembly = exhibit.timeline.staging.assembly
     film = Timeline(Staging(assembly, assembly.names, tuple(plan), tuple(motions), guessed=frozenset(guessed)))
-    search = replace(shown.search, steps=tuple(plan), refusals=())
-    return replace(shown, timeline=film, search=replace(search, **change))
+    search = replace(exhibit.search, steps=tuple(plan), refusals=())
+    return replace(exhibit, timeline=film, search=replace(search, **change))
 
 
-def test_ways_that_were_looked_for_are_remarked_on_once(shown):
-    plan, motions = shown.timeline.staging.plan, shown.timeline.staging.motions
-    given = steps(shown, None)
+def test_ways_that_were_looked_for_are_remarked_on_once(exhibit):
+    plan, motions = exhibit.timeline.staging.plan, exhibit.timeline.staging.motions
+    given = steps(exhibit, None)
     assert "looked for" not in given
-    without = changed(shown, plan, motions, range(len(plan)))
+    without = changed(exhibit, plan, motions, range(len(plan)))
     assert steps(without, None).count("looked for") == 1
     assert "looked for" not in caption(without, 0.5)
-    mixed = steps(changed(shown, plan, motions, [2]), None)
+    mixed = steps(changed(exhibit, plan, motions, [2]), None)
     assert mixed.count("looked for") == 1
     rows = [row for row in mixed.split("<li")[1:] if "data-step" in row]
     assert [" *</li>" in row for row in rows] == [i == 2 for i in range(len(motions))]
 
 
-def test_what_goes_together_is_held_or_makes_way_is_said(shown):
-    action, first = shown.timeline.staging.plan[0], shown.timeline.staging.motions[0]
-    a, b, c, d = [n for n in shown.timeline.names if n != action][:4]
+def test_what_goes_together_is_held_or_makes_way_is_said(exhibit):
+    action, first = exhibit.timeline.staging.plan[0], exhibit.timeline.staging.motions[0]
+    a, b, c, d = [n for n in exhibit.timeline.names if n != action][:4]
     tracks = tuple(replace(first.tracks[0], parts=parts) for parts in ((action, a, b), (c,)))
-    one = changed(shown, [action], [replace(first, parts=(action, a, b), tracks=tracks, held=(d,))])
+    one = changed(exhibit, [action], [replace(first, parts=(action, a, b), tracks=tracks, held=(d,))])
     said = caption(one, 0.5)
     assert f"<b>{action}, {a}, {b}</b> together leave " in said
     assert f"{c} making way" in said
     assert f">{d}</span> is held" in said
     assert f"together with {a}, {b}, {c} making way, while {d} is held" in steps(one, 0)
     tracks = tuple(replace(first.tracks[0], parts=parts) for parts in ((a, b), (c,)))
-    other = caption(changed(shown, [action], [replace(first, parts=(a, b), tracks=tracks)]), 0.5)
+    other = caption(changed(exhibit, [action], [replace(first, parts=(a, b), tracks=tracks)]), 0.5)
     assert f"<b>{action}</b>: <b>{a}, {b}</b> together leave" in other
-    assert "together" not in caption(shown, 0.5)
+    assert "together" not in caption(exhibit, 0.5)
 
 
-def test_a_long_list_keeps_the_step_under_way_in_sight(shown):
-    staging = shown.timeline.staging
-    long = changed(shown, staging.plan[:1] * 100, staging.motions[:1] * 100)
+def test_a_long_list_keeps_the_step_under_way_in_sight(exhibit):
+    staging = exhibit.timeline.staging
+    long = changed(exhibit, staging.plan[:1] * 100, staging.motions[:1] * 100)
     assert steps(long, None).count("<li") == 100
     for now in (0, 3, 50, 97, 99):
         text = steps(long, now)
@@ -456,17 +456,17 @@ def test_a_long_list_keeps_the_step_under_way_in_sight(shown):
         assert f"aria-current='step' data-step='{now}'" in text
 
 
-def test_where_there_is_no_plan_the_panel_says_why(shown):
+def test_where_there_is_no_plan_the_panel_says_why(exhibit):
     never = {"status": ns.Status.UNSOLVABLE, "why_not": ("a blocks b", "b blocks a")}
-    stuck = changed(shown, [], [], **never)
+    stuck = changed(exhibit, [], [], **never)
     assert "No plan, and no step to show" in steps(stuck, None)
     assert steps(stuck, None).count("blocks") == 2
     assert "no plan" in caption(stuck, 0.0)
-    staging = shown.timeline.staging
-    some = changed(shown, staging.plan[:2], staging.motions[:2], refusals=shown.search.refusals[:1], **never)
+    staging = exhibit.timeline.staging
+    some = changed(exhibit, staging.plan[:2], staging.motions[:2], refusals=exhibit.search.refusals[:1], **never)
     assert "the longest prefix that works is shown" in steps(some, None)
     assert "tab Search" in steps(some, None)
-    assert "no plan" not in caption(shown, 0.0)
+    assert "no plan" not in caption(exhibit, 0.0)
 
 
 def test_attempts_come_in_order_with_the_plan_between():
@@ -566,15 +566,15 @@ def test_without_a_prior_the_panel_says_so():
 # -- planning in a thread -------------------------------------------------------------------------------------------
 
 
-def test_a_search_is_shown_with_its_prior_and_pictures(shown):
-    assert shown.search.solved
-    assert shown.search.scores.actions == shown.problem.actions
-    assert shown.pictures.shape == (4, 64, 64, 3)
-    assert shown.timeline.n_steps == 7
-    assert shown.notes == ()
-    counts = shown.search.counts
+def test_a_search_is_shown_with_its_prior_and_pictures(exhibit):
+    assert exhibit.search.solved
+    assert exhibit.search.scores.actions == exhibit.problem.actions
+    assert exhibit.pictures.shape == (4, 64, 64, 3)
+    assert exhibit.timeline.n_steps == 7
+    assert exhibit.notes == ()
+    counts = exhibit.search.counts
     assert counts["attempts"] >= counts["iterations"] + 7
-    assert len(shown.search.refusals) == counts["iterations"]
+    assert len(exhibit.search.refusals) == counts["iterations"]
 
 
 @pytest.mark.parametrize("planner", ns.planner_names())
@@ -585,11 +585,11 @@ def test_a_stop_ends_every_planner(planner):
         time.sleep(0.01)
     planning.stop()
     assert planning.wait(5)
-    if planner == "swap-repair" and planning.shown.search.status is ns.Status.GAVE_UP:
+    if planner == "swap-repair" and planning.exhibit.search.status is ns.Status.GAVE_UP:
         return
-    assert planning.shown.search.status is ns.Status.OUT_OF_BUDGET
-    assert "Stopped" in planning.shown.search.sentence
-    assert planning.shown.timeline is not None
+    assert planning.exhibit.search.status is ns.Status.OUT_OF_BUDGET
+    assert "Stopped" in planning.exhibit.search.sentence
+    assert planning.exhibit.timeline is not None
     asked = slow.asked
     time.sleep(0.1)
     assert slow.asked == asked, "nothing goes on behind the page"
@@ -618,7 +618,7 @@ def test_a_stop_before_the_search_begins_is_heeded():
 
     planning = Planning(lambda: (time.sleep(0.05), make())[1], Query("slow"))
     assert planning.wait(5)
-    assert planning.shown is None
+    assert planning.exhibit is None
     assert "before" in planning.message
     assert slow.asked == 0
 
@@ -665,12 +665,12 @@ def plan_file(tmp_path, capsys):
 def test_a_plan_is_opened_as_it_was_made(plan_file):
     source = open_source(Query(str(plan_file)))
     document = json.loads(plan_file.read_text())
-    shown = Shown.saved(source.saved)
-    assert list(shown.search.steps) == document["plan"]
-    assert shown.search.counts["iterations"] == document["iterations"]
-    assert len(shown.search.refusals) == len(document["refusals"])
-    assert shown.search.scores is not None
-    assert not shown.timeline.staging.guessed
+    exhibit = Exhibit.saved(source.saved)
+    assert list(exhibit.search.steps) == document["plan"]
+    assert exhibit.search.counts["iterations"] == document["iterations"]
+    assert len(exhibit.search.refusals) == len(document["refusals"])
+    assert exhibit.search.scores is not None
+    assert not exhibit.timeline.staging.guessed
     assert (source.query.domain, source.query.number, source.query.prior) == ("soma", 17, "random")
     assert source.query.options["collapse"] == "rigid"
 
@@ -680,9 +680,9 @@ def test_a_plan_that_was_edited_is_not_shown_as_one_that_holds(plan_file, tmp_pa
     turned = {**document, "plan": document["plan"][::-1], "steps": document["steps"][::-1]}
     edited = tmp_path / "edited.json"
     edited.write_text(json.dumps(turned))
-    shown = Shown.saved(open_source(Query(str(edited))).saved)
-    assert not shown.search.solved
-    assert "does not hold" in shown.search.sentence
+    exhibit = Exhibit.saved(open_source(Query(str(edited))).saved)
+    assert not exhibit.search.solved
+    assert "does not hold" in exhibit.search.sentence
     edited.write_text(json.dumps({**document, "plan": document["plan"][:2]}))
     with pytest.raises(ns.InputError, match="the same actions"):
         open_source(Query(str(edited)))
@@ -696,20 +696,20 @@ def test_a_number_does_not_go_with_a_file(plan_file):
 def test_a_prior_that_is_gone_leaves_a_note(plan_file):
     document = json.loads(plan_file.read_text()) | {"prior": "gone.safetensors"}
     plan_file.write_text(json.dumps(document))
-    shown = Shown.saved(open_source(Query(str(plan_file))).saved)
-    assert shown.search.scores is None
-    assert "gone.safetensors" in shown.notes[0]
+    exhibit = Exhibit.saved(open_source(Query(str(plan_file))).saved)
+    assert exhibit.search.scores is None
+    assert "gone.safetensors" in exhibit.notes[0]
 
 
 def test_a_search_that_found_nothing_is_worth_a_look(tmp_path, capsys):
     path = tmp_path / "none.json"
     before = [part for other in "VTZABP" for part in ("--before", f"L,{other}")]
     assert call("plan", "soma", "--problem", 17, *before, "--out", path) == 11
-    shown = Shown.saved(open_source(Query(str(path))).saved)
-    assert shown.search.status is ns.Status.UNSOLVABLE
-    assert shown.search.refusals
-    assert shown.timeline.n_steps == 0
-    assert (shown.timeline.where == IN_PLACE).all()
+    exhibit = Exhibit.saved(open_source(Query(str(path))).saved)
+    assert exhibit.search.status is ns.Status.UNSOLVABLE
+    assert exhibit.search.refusals
+    assert exhibit.timeline.n_steps == 0
+    assert (exhibit.timeline.where == IN_PLACE).all()
 
 
 @pytest.mark.parametrize(
@@ -726,7 +726,7 @@ def test_a_search_that_found_nothing_is_worth_a_look(tmp_path, capsys):
 def test_a_plan_that_is_none_is_refused(plan_file, change, said):
     plan_file.write_text(json.dumps(json.loads(plan_file.read_text()) | change))
     with pytest.raises(ns.InputError, match=said):
-        Shown.saved(open_source(Query(str(plan_file))).saved)
+        Exhibit.saved(open_source(Query(str(plan_file))).saved)
 
 
 def test_a_domain_or_a_path_and_nothing_else():
@@ -770,13 +770,13 @@ def test_the_film_of_a_prefix_shows_how_its_steps_are_done(tmp_path):
     source = open_source(query)
     planning = Planning(lambda: source.problem, source.query)
     assert planning.wait(60)
-    shown = planning.shown
-    assert not shown.search.solved
-    assert shown.search.steps
-    first = shown.timeline.staging.motions[0]
+    exhibit = planning.exhibit
+    assert not exhibit.search.solved
+    assert exhibit.search.steps
+    first = exhibit.timeline.staging.motions[0]
     assert not first.arrives
     assert len(first.parts) == 2
-    assert not shown.timeline.staging.guessed
+    assert not exhibit.timeline.staging.guessed
 
 
 def test_an_assembly_is_planned_as_plan_plans_it(tmp_path, capsys):
@@ -890,9 +890,9 @@ def viewer():
 
 
 @pytest.fixture(scope="module")
-def tab(browser, viewer, shown):
+def tab(browser, viewer, exhibit):
     """The page in a browser, with all that it said on its console and all that it asked for."""
-    viewer.show(shown)
+    viewer.show(exhibit)
     tab = browser.new_page(viewport=SMALL)
     tab.set_default_timeout(120_000)
     tab.add_init_script(SELDOM)
@@ -923,15 +923,15 @@ def test_the_page_loads_without_errors_and_asks_nobody_else(tab, viewer):
     assert all(u.startswith(("http://127.0.0.1", "data:", "blob:")) for u in tab.asked), tab.asked
 
 
-def test_the_slider_moves_the_right_part(tab, viewer, shown):
+def test_the_slider_moves_the_right_part(tab, viewer, exhibit):
     before = [part.position.copy() for part in viewer.scene.parts]
     field(tab, "Step").fill("0.5")
     field(tab, "Step").press("Enter")
     until(lambda: viewer.slider.value == 0.5)
     until(lambda: viewer._step_shown == (0, 0))
     changed = [(old != part.position).any() for old, part in zip(before, viewer.scene.parts)]
-    moved = list(itertools.compress(shown.timeline.names, changed))
-    assert moved == [shown.search.steps[0]]
+    moved = list(itertools.compress(exhibit.timeline.names, changed))
+    assert moved == [exhibit.search.steps[0]]
     tab.get_by_text("Step 1 of 7").wait_for()
 
 
@@ -958,17 +958,17 @@ def test_a_part_that_is_chosen_tells_its_facts(tab, viewer):
     assert all(part.opacity is None for part in viewer.scene.parts)
 
 
-def test_the_prior_and_the_search_are_there_to_read(tab, viewer, shown):
+def test_the_prior_and_the_search_are_there_to_read(tab, viewer, exhibit):
     tab.get_by_role("tab", name="Prior").click()
     tab.locator("svg rect[stroke]").first.wait_for()
     assert tab.locator("svg rect[stroke]").count() == 7
     assert tab.locator(".ns img").count() == 4
     tab.get_by_role("tab", name="Search").click()
-    tab.get_by_text(shown.search.refusals[0].reason).first.wait_for()
+    tab.get_by_text(exhibit.search.refusals[0].reason).first.wait_for()
 
 
-def test_parts_are_seen_in_their_own_colours(tab, viewer, shown):
-    viewer.show(shown)
+def test_parts_are_seen_in_their_own_colours(tab, viewer, exhibit):
+    viewer.show(exhibit)
     viewer.names.value = False
     viewer.slider.value = 7.0  # all parts are set down, and each is seen
     own = [np.array(part.color, dtype=float) for part in viewer.scene.parts]
@@ -986,10 +986,10 @@ def test_parts_are_seen_in_their_own_colours(tab, viewer, shown):
     viewer.slider.value = 0.0
 
 
-def test_what_is_held_has_a_bold_outline_while_the_step_is_done(viewer, shown):
-    plan, motions = shown.timeline.staging.plan, shown.timeline.staging.motions
+def test_what_is_held_has_a_bold_outline_while_the_step_is_done(viewer, exhibit):
+    plan, motions = exhibit.timeline.staging.plan, exhibit.timeline.staging.motions
     held = plan[-1]
-    viewer.show(changed(shown, plan, [replace(motions[0], held=(held,)), *motions[1:]]))
+    viewer.show(changed(exhibit, plan, [replace(motions[0], held=(held,)), *motions[1:]]))
     outlines = viewer.scene._outlines
     usual = {name: outline.thickness for name, outline in outlines.items()}
     viewer.scene.show(0.5)
@@ -998,29 +998,29 @@ def test_what_is_held_has_a_bold_outline_while_the_step_is_done(viewer, shown):
     viewer.scene.show(1.5)
     assert {name: outline.thickness for name, outline in outlines.items()} == usual
     assert len({tuple(outline.colors.reshape(-1, 3)[0]) for outline in outlines.values()}) == 1
-    viewer.show(shown)
+    viewer.show(exhibit)
 
 
-def test_a_refusal_shows_what_stood_in_the_way(viewer, shown):
-    viewer.show(shown)
-    refusal = shown.search.refusals[0]
-    own = dict(zip(shown.timeline.names, [tuple(part.color) for part in viewer.scene.parts]))
+def test_a_refusal_shows_what_stood_in_the_way(viewer, exhibit):
+    viewer.show(exhibit)
+    refusal = exhibit.search.refusals[0]
+    own = dict(zip(exhibit.timeline.names, [tuple(part.color) for part in viewer.scene.parts]))
     viewer.refusal.value = 1
-    colours = dict(zip(shown.timeline.names, [tuple(part.color) for part in viewer.scene.parts]))
+    colours = dict(zip(exhibit.timeline.names, [tuple(part.color) for part in viewer.scene.parts]))
     assert {n for n, c in colours.items() if c == TRIED} == {refusal.action}
     assert {n for n, c in colours.items() if c == BECAUSE} == set(refusal.because) - {refusal.action}
     assert refusal.reason in viewer.refusal_text.content
-    if shown.search.steps[: len(refusal.after)] == refusal.after:
+    if exhibit.search.steps[: len(refusal.after)] == refusal.after:
         assert viewer.slider.value == len(refusal.after)
     viewer._clicked("T")
     assert viewer.refusal.value == 0
     viewer._clicked("T")
     assert viewer.part.value == "(no part)"
-    assert dict(zip(shown.timeline.names, [tuple(part.color) for part in viewer.scene.parts])) == own
+    assert dict(zip(exhibit.timeline.names, [tuple(part.color) for part in viewer.scene.parts])) == own
 
 
-def test_a_late_click_on_what_was_shown_before_changes_nothing(viewer, shown):
-    viewer.show(shown)
+def test_a_late_click_on_what_was_shown_before_changes_nothing(viewer, exhibit):
+    viewer.show(exhibit)
     viewer._clicked("no longer there")
     assert viewer.part.value == "(no part)"
     assert {part.opacity for part in viewer.scene.parts} == {None}
@@ -1034,7 +1034,7 @@ def test_bad_input_shows_a_message(tab, viewer):
         tab.get_by_role("button", name="Plan again").click()
         tab.get_by_role("alert").get_by_text(said).wait_for()
     assert "Traceback" not in tab.content()
-    assert viewer.shown.problem.name == "soma-17", "what was shown stays"
+    assert viewer.exhibit.problem.name == "soma-17", "what was shown stays"
 
 
 def test_one_can_plan_again(tab, viewer):
@@ -1042,7 +1042,7 @@ def test_one_can_plan_again(tab, viewer):
     field(tab, "Problem").fill("3")
     until(lambda: viewer.form.number.value == "3")
     tab.get_by_role("button", name="Plan again").click()
-    until(lambda: viewer.shown.problem.name == "soma-3")
+    until(lambda: viewer.exhibit.problem.name == "soma-3")
     tab.get_by_text("soma-3").first.wait_for()
     assert viewer.slider.value == 0.0
     assert len(viewer.scene.parts) == 7
@@ -1082,12 +1082,12 @@ def test_stop_ends_a_search(tab, viewer):
         viewer.plan(viewer.query)
     tab.get_by_role("button", name="Stop").click()
     assert planning.wait(5)
-    until(lambda: viewer.shown.problem.name == "slow")
+    until(lambda: viewer.exhibit.problem.name == "slow")
     tab.get_by_text("Stopped").locator("visible=true").first.wait_for()
     assert tab.errors == []
 
 
-def test_what_cannot_be_shown_is_said_and_the_page_goes_on(shown, monkeypatch, caplog):
+def test_what_cannot_be_shown_is_said_and_the_page_goes_on(exhibit, monkeypatch, caplog):
     from neurosym.viewer.page import Page
     from neurosym.viewer.server import LocalServer
 
@@ -1100,7 +1100,7 @@ def test_what_cannot_be_shown_is_said_and_the_page_goes_on(shown, monkeypatch, c
             until(lambda: "cannot be shown: ZeroDivisionError" in page.form.message.content)
         assert "What was planned cannot be shown." in caplog.text
         page.plan(page.query)
-        until(lambda: page.shown is not None and page.planning is None)
+        until(lambda: page.exhibit is not None and page.planning is None)
         page.play.label = "Play"
         page._toggle()
         until(lambda: page.slider.value > 0)
@@ -1121,7 +1121,7 @@ def test_while_the_first_search_goes_on_the_page_shows_the_parts_and_how_far_it_
         assert page.play.disabled
         page.plan(page.query, slow.problem)
         until(lambda: "attempts" in page.caption.content)
-        assert page.shown is None
+        assert page.exhibit is None
         assert len(page.scene.parts) == 14
         assert all(part.visible for part in page.scene.parts)
         page._clicked("p0")  # nothing is known of it yet
@@ -1130,7 +1130,7 @@ def test_while_the_first_search_goes_on_the_page_shows_the_parts_and_how_far_it_
         page._stop()
         until(lambda: page.planning is None)
         until(lambda: not page.slider.disabled)
-        page.shown = None
+        page.exhibit = None
         page.plan(replace(page.query, domain="soma", number=999))
         until(lambda: "0 to 239" in page.caption.content)
     finally:
@@ -1223,9 +1223,9 @@ def test_the_exported_page_plays_without_server_and_network(browser, plan_file, 
 
 
 @pytest.mark.parametrize("player", ["<p>something else</p>", "<input value='soon'>", "<input value=''>"])
-def test_the_list_stays_a_list_where_the_player_is_another(browser, shown, player, tmp_path):
+def test_the_list_stays_a_list_where_the_player_is_another(browser, exhibit, player, tmp_path):
     page = tmp_path / "page.html"
-    page.write_text(_with_panel(f"<html><body><div id='root'>{player}</div></body></html>", shown))
+    page.write_text(_with_panel(f"<html><body><div id='root'>{player}</div></body></html>", exhibit))
     tab = browser.new_page()
     errors = []
     tab.on("pageerror", lambda e: errors.append(str(e)))
@@ -1243,9 +1243,9 @@ def test_the_list_stays_a_list_where_the_player_is_another(browser, shown, playe
     tab.close()
 
 
-def test_an_export_that_fails_leaves_nothing(shown, tmp_path):
+def test_an_export_that_fails_leaves_nothing(exhibit, tmp_path):
     from neurosym.viewer.export import export_page
 
     with pytest.raises(ns.InputError, match="in space"):
-        export_page(replace(shown, timeline=None, notes=("no parts",)), tmp_path / "x.html")
+        export_page(replace(exhibit, timeline=None, notes=("no parts",)), tmp_path / "x.html")
     assert not list(tmp_path.iterdir())

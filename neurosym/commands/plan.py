@@ -170,18 +170,18 @@ def _show(problem: Problem, results: Sequence[PlanResult], answer: dict[str, Any
 def _show_steps(steps: Sequence[str], result: PlanResult) -> None:
     """The plan and the refusals in the order in which they came; those off the plan's path say after what."""
     motions = [f"  {motion}" if motion else "" for motion in result.motions] or [""] * len(steps)
-    shown = 0
+    printed = 0
 
     def advance(to: int) -> int:
-        for i in range(shown, to):
+        for i in range(printed, to):
             print(f"  {i + 1}. {steps[i]}{motions[i]}")
-        return max(shown, to)
+        return max(printed, to)
 
     for refusal in result.blame:
         depth = len(refusal.after)
         on_path = tuple(steps[:depth]) == refusal.after
         if on_path:
-            shown = advance(depth)
-        elsewhere = "" if on_path and depth == shown else f" (after {joined(refusal.after) or 'nothing'})"
+            printed = advance(depth)
+        elsewhere = "" if on_path and depth == printed else f" (after {joined(refusal.after) or 'nothing'})"
         print(f"     not {refusal.action}{elsewhere}: {refusal.reason}")
     advance(len(steps))

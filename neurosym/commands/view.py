@@ -15,7 +15,7 @@ from neurosym.commands.common import SearchOptions, family_options, say
 from neurosym.errors import InputError
 
 if TYPE_CHECKING:
-    from neurosym.viewer.shown import Shown
+    from neurosym.viewer.exhibit import Exhibit
     from neurosym.viewer.sources import Source
 
 #: Where the page listens unless told otherwise: this machine alone sees it.
@@ -51,9 +51,9 @@ def view(
     from neurosym.viewer import need_viser
 
     need_viser()
+    from neurosym.viewer.exhibit import Exhibit, Query
     from neurosym.viewer.export import check_name, export_page
     from neurosym.viewer.planning import Planning, check_query
-    from neurosym.viewer.shown import Query, Shown
     from neurosym.viewer.sources import open_source
 
     if export is not None:
@@ -67,22 +67,22 @@ def view(
     source = open_source(query, search.own_cells(), files.reading())
     if search.prior is None and source.saved is None:
         source = replace(source, query=replace(source.query, prior=source.usual_prior))
-    shown = None if source.saved is None else Shown.saved(source.saved)
+    exhibit = None if source.saved is None else Exhibit.saved(source.saved)
     if export is None:
-        _serve(source, shown, host=host, port=port, browser=browser)
+        _serve(source, exhibit, host=host, port=port, browser=browser)
         return
-    if shown is None:
+    if exhibit is None:
         planning = Planning(lambda: source.problem, source.query)
         planning.wait()
-        if planning.shown is None:
+        if planning.exhibit is None:
             raise InputError(planning.message or "")
-        shown = planning.shown
-    export_page(shown, export)
-    print(f"{export}: {shown.problem.name}, {len(shown.search.steps)} steps. {shown.search.sentence}")
-    raise typer.Exit(shown.search.status.exit_code)
+        exhibit = planning.exhibit
+    export_page(exhibit, export)
+    print(f"{export}: {exhibit.problem.name}, {len(exhibit.search.steps)} steps. {exhibit.search.sentence}")
+    raise typer.Exit(exhibit.search.status.exit_code)
 
 
-def _serve(source: Source, shown: Shown | None, *, host: str, port: int, browser: bool) -> None:
+def _serve(source: Source, exhibit: Exhibit | None, *, host: str, port: int, browser: bool) -> None:
     """Show the page until the keyboard ends it."""
     from neurosym.viewer.page import Page
     from neurosym.viewer.server import LOOPBACKS, LocalServer
@@ -90,10 +90,10 @@ def _serve(source: Source, shown: Shown | None, *, host: str, port: int, browser
     server = LocalServer(host, port, "neurosym")
     page = Page(server, source.query, source.given)
     try:
-        if shown is None:
+        if exhibit is None:
             page.plan(source.query, source.problem)
         else:
-            page.show(shown)
+            page.show(exhibit)
         name = "localhost" if host in ("0.0.0.0", "::") else f"[{host}]" if ":" in host else host
         address = f"http://{name}:{server.get_port()}"
         print(f"{address} shows {source.problem.name}. Ctrl+C ends it.", flush=True)

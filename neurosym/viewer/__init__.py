@@ -1,7 +1,7 @@
 """A page to look at: the assembly in 3D, the plan as a film, and what the search knew and did.
 
 `timeline`, `facts`, `solids`, `panels`, `steps` and `score_table` are pure: they know no server. `sources` opens what
-there is to see, `planning` plans it, `shown` holds what is shown; `page`, `scene` and `form` show it with viser
+there is to see, `planning` plans it, `exhibit` holds what is shown; `page`, `scene` and `form` show it with viser
 (extra `viewer`), and `export` writes a page that needs no server, whose list follows its film (`follow`).
 """
 

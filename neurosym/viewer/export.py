@@ -10,11 +10,11 @@ import numpy as np
 from neurosym.errors import InputError
 from neurosym.support.files import write_text
 from neurosym.viewer import panels
+from neurosym.viewer.exhibit import Exhibit
 from neurosym.viewer.follow import follower
 from neurosym.viewer.scene import PlanScene
 from neurosym.viewer.score_table import scores_table
 from neurosym.viewer.server import LocalServer
-from neurosym.viewer.shown import Shown
 from neurosym.viewer.steps import attempts, caption, most_refused, steps
 
 #: Scene updates a second of the recording, and seconds that a step takes.
@@ -27,7 +27,7 @@ PAUSE = 1.0
 PANEL = 400
 
 
-def export_page(shown: Shown, path: str | Path) -> Path:
+def export_page(exhibit: Exhibit, path: str | Path) -> Path:
     """Write a self-contained page, whole or not at all; its folder is made. Returns the path.
 
     Raises:
@@ -35,9 +35,9 @@ def export_page(shown: Shown, path: str | Path) -> Path:
     """
     path = Path(path)
     check_name(path)
-    if shown.timeline is None:
-        raise InputError(f"Expected a problem whose plan can be shown in space. {' '.join(shown.notes)}")
-    write_text(path, _with_panel(_film(shown), shown))
+    if exhibit.timeline is None:
+        raise InputError(f"Expected a problem whose plan can be shown in space. {' '.join(exhibit.notes)}")
+    write_text(path, _with_panel(_film(exhibit), exhibit))
     return path
 
 
@@ -47,9 +47,9 @@ def check_name(path: Path) -> None:
         raise InputError(f"Expected a file name that ends in .html; got {path.name!r}.")
 
 
-def _film(shown: Shown) -> str:
+def _film(exhibit: Exhibit) -> str:
     """viser's own player with the recording in it."""
-    timeline = shown.timeline
+    timeline = exhibit.timeline
     assert timeline is not None
     server = LocalServer()
     try:
@@ -67,15 +67,15 @@ def _film(shown: Shown) -> str:
         server.stop()
 
 
-def _with_panel(film: str, shown: Shown) -> str:
+def _with_panel(film: str, exhibit: Exhibit) -> str:
     """The player with what the panel of the page says beside it."""
-    search, total = shown.search, len(shown.search.steps)
+    search, total = exhibit.search, len(exhibit.search.steps)
     content = (
-        f"<div id='now'>{caption(shown, 0.0)}</div>{panels.overview(shown)}"
-        f"<div id='steps'>{steps(shown, None)}</div>"
+        f"<div id='now'>{caption(exhibit, 0.0)}</div>{panels.overview(exhibit)}"
+        f"<div id='steps'>{steps(exhibit, None)}</div>"
         f"<p class='quiet hint'>A click on a step goes there and waits; the player's button plays on.</p>"
-        f"<h3>Prior</h3>{scores_table(search.scores, shown.problem.actions, search.steps)}"
-        f"<h3>Reference</h3>{panels.pictures(shown.pictures)}"
+        f"<h3>Prior</h3>{scores_table(search.scores, exhibit.problem.actions, search.steps)}"
+        f"<h3>Reference</h3>{panels.pictures(exhibit.pictures)}"
         f"<h3>Attempts, in order</h3>{most_refused(search)}{attempts(search)}"
     )
     style = (
@@ -88,8 +88,8 @@ def _with_panel(film: str, shown: Shown) -> str:
         ".hint{display:none}#steps.live+.hint{display:block}</style>"
     )
     times = (0.0, *(i + 0.5 for i in range(total)), float(total))
-    script = follower([caption(shown, t) for t in times], PAUSE, SECONDS_PER_STEP) if total else ""
-    title = f"<title>{escape(shown.problem.name)}</title>"
+    script = follower([caption(exhibit, t) for t in times], PAUSE, SECONDS_PER_STEP) if total else ""
+    title = f"<title>{escape(exhibit.problem.name)}</title>"
     aside = f"{style}<aside id='said'>{panels.styled(content)}</aside>{script}"
     before, body, after = film.replace("<title>Viser</title>", title, 1).rpartition("</body>")
     return f"{before}{aside}{body}{after}" if body else after + aside

@@ -26,7 +26,7 @@ def follower(captions: Sequence[str], pause: float, seconds_per_step: float) -> 
 _SCRIPT = """(captions, pause, each, total, wait) => {
   const now = document.getElementById("now"), list = document.getElementById("steps");
   const rows = [...list.querySelectorAll("li[data-step]")];
-  let shown = null;
+  let marked = null;
   const clock = () => {
     const field = document.querySelector("#root input");
     return field && field.value.trim() !== "" && isFinite(field.value) ? field : null;
@@ -38,8 +38,8 @@ _SCRIPT = """(captions, pause, each, total, wait) => {
     // The clock shows tenths: half of one more, and a step begins no later than its number.
     const past = (Number(field.value) + 0.05 - pause) / each;
     const step = past < 0 ? -1 : Math.min(Math.floor(past), total);
-    if (step === shown) return;
-    shown = step;
+    if (step === marked) return;
+    marked = step;
     now.innerHTML = captions[step + 1];
     for (const row of rows) {
       const on = Number(row.dataset.step) === step;

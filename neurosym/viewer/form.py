@@ -13,8 +13,8 @@ from neurosym.language.options import options_of, read_options
 from neurosym.pipeline import ORACLES
 from neurosym.registry import domain_names, planner_names, prior_names
 from neurosym.viewer import panels
+from neurosym.viewer.exhibit import REFUSED, Maker, Query
 from neurosym.viewer.planning import Planning, maker_of
-from neurosym.viewer.shown import REFUSED, Maker, Query
 
 NO_PRIOR = "none"
 

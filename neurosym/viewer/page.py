@@ -14,13 +14,13 @@ from neurosym.errors import InputError
 from neurosym.language.problem import Problem
 from neurosym.planning.staging import stage
 from neurosym.viewer import panels
+from neurosym.viewer.exhibit import REFUSED, Exhibit, Maker, Query, Search
 from neurosym.viewer.facts import part_facts
 from neurosym.viewer.form import Form, assign
 from neurosym.viewer.planning import Planning, check_query, problem_maker
 from neurosym.viewer.scene import PlanScene, named_at_first
 from neurosym.viewer.score_table import scores_table
 from neurosym.viewer.server import LocalServer
-from neurosym.viewer.shown import REFUSED, Maker, Query, Search, Shown
 from neurosym.viewer.steps import BECAUSE, MOST_REFUSALS, TRIED, attempts, caption, looked_at, most_refused, steps
 from neurosym.viewer.timeline import Timeline
 
@@ -47,7 +47,7 @@ class Page:
         self.server = server
         self.query = query
         self.given = dict(given or {})
-        self.shown: Shown | None = None
+        self.exhibit: Exhibit | None = None
         self.planning: Planning | None = None
         self.playing = False
         self._lock = threading.RLock()
@@ -59,11 +59,11 @@ class Page:
         self._clock = threading.Thread(target=self._run, name="neurosym view", daemon=True)
         self._clock.start()
 
-    def show(self, shown: Shown) -> None:
+    def show(self, exhibit: Exhibit) -> None:
         """Put a problem with its search on the page, at the beginning of its film."""
         with self._lock:
-            self.shown, self.playing = shown, False
-            timeline, search = shown.timeline, shown.search
+            self.exhibit, self.playing = exhibit, False
+            timeline, search = exhibit.timeline, exhibit.search
             n_steps, names = (timeline.n_steps, timeline.names) if timeline else (0, ())
             self.scene.put(timeline)
             self.slider.max = max(n_steps, 1)
@@ -72,8 +72,8 @@ class Page:
             self.part.options = (NO_PART, *names)
             assign(self.part, NO_PART)
             assign(self.names, named_at_first(timeline))
-            table = scores_table(search.scores, shown.problem.actions, search.steps)
-            reference = f"<p><b>Reference</b></p>{panels.pictures(shown.pictures)}"
+            table = scores_table(search.scores, exhibit.problem.actions, search.steps)
+            reference = f"<p><b>Reference</b></p>{panels.pictures(exhibit.pictures)}"
             self.prior_tab.content = panels.styled(table + reference)
             self._list_attempts(search, 0)
             self.refusal.max, self.refusal.disabled = max(len(search.refusals), 1), not search.refusals
@@ -96,7 +96,7 @@ class Page:
             make = problem_maker(query, self.given) if problem is None else lambda: problem
             self.planning = Planning(make, query)
             self.form.refuse("")
-            if self.shown is None and problem is not None:
+            if self.exhibit is None and problem is not None:
                 # What is there before any step, while the first search goes on.
                 with contextlib.suppress(*REFUSED):
                     self.scene.put(Timeline(stage(problem, ()), problem.geometry))
@@ -146,20 +146,20 @@ class Page:
     def _moved(self, t: float) -> None:
         """Show time t, and what the panel says of it."""
         with self._lock:
-            shown = self.shown
-            if shown is None:
+            exhibit = self.exhibit
+            if exhibit is None:
                 return
             self.scene.show(t)
-            now = shown.timeline.step_at(t) if shown.timeline else None
+            now = exhibit.timeline.step_at(t) if exhibit.timeline else None
             if (now, int(t)) != self._step_shown:
                 self._step_shown = now, int(t)
-                self.plan_tab.content = panels.styled(panels.overview(shown) + steps(shown, now))
-                self.caption.content = panels.styled(caption(shown, t))
+                self.plan_tab.content = panels.styled(panels.overview(exhibit) + steps(exhibit, now))
+                self.caption.content = panels.styled(caption(exhibit, t))
                 self._tell_facts()
 
     def _toggle(self) -> None:
         with self._lock:
-            timeline = self.shown.timeline if self.shown else None
+            timeline = self.exhibit.timeline if self.exhibit else None
             if timeline is None:
                 return
             if not self.playing and self.slider.value >= timeline.n_steps:
@@ -175,7 +175,7 @@ class Page:
         """A part was chosen."""
         with self._lock:
             # A click may come late, for a part of what was shown before.
-            if self.shown is None or name not in self.part.options:
+            if self.exhibit is None or name not in self.part.options:
                 return
             if self.part.value != name:
                 assign(self.part, name)  # which calls this again
@@ -193,8 +193,8 @@ class Page:
     def _look_at(self, number: int) -> None:
         """Show refusal `number`, from 1: what was tried and what stood in the way; 0 ends it."""
         with self._lock:
-            shown = self.shown
-            if shown is None or not 0 <= number <= len(shown.search.refusals):
+            exhibit = self.exhibit
+            if exhibit is None or not 0 <= number <= len(exhibit.search.refusals):
                 return
             if number == 0:
                 self.refusal_text.content = ""
@@ -202,14 +202,14 @@ class Page:
                     self.scene.stand_out(None)
                 return
             assign(self.part, NO_PART)
-            refusal = shown.search.refusals[number - 1]
+            refusal = exhibit.search.refusals[number - 1]
             self.refusal_text.content = panels.styled(looked_at(number, refusal))
-            if len(shown.search.refusals) > MOST_REFUSALS:
-                self._list_attempts(shown.search, number)
-            timeline = shown.timeline
+            if len(exhibit.search.refusals) > MOST_REFUSALS:
+                self._list_attempts(exhibit.search, number)
+            timeline = exhibit.timeline
             if timeline is None:
                 return
-            if shown.search.steps[: len(refusal.after)] == refusal.after:
+            if exhibit.search.steps[: len(refusal.after)] == refusal.after:
                 self._play(False)
                 assign(self.slider, float(len(refusal.after)))
             colours: dict[str, tuple[int, int, int] | None] = dict.fromkeys(refusal.because, BECAUSE)
@@ -217,7 +217,7 @@ class Page:
             self.scene.stand_out(colours | dict.fromkeys(moved.get(refusal.action, (refusal.action,)), TRIED))
 
     def _tell_facts(self) -> None:
-        timeline = self.shown.timeline if self.shown else None
+        timeline = self.exhibit.timeline if self.exhibit else None
         name = self.part.value
         if timeline is None or name not in timeline.names:
             self.part_tab.content = panels.styled("<p>Click a part, or choose one.</p>")
@@ -253,25 +253,25 @@ class Page:
                 return
             if planning.running:
                 self.form.busy(planning)
-                if self.shown is None:
+                if self.exhibit is None:
                     self.caption.content = panels.styled(panels.progress(planning.progress, stopping=planning.stopped))
                 return
             self.planning = None
             self.form.busy(None)
-            if planning.shown is None:
+            if planning.exhibit is None:
                 message = planning.message or ""
                 self.form.refuse(message)
-                if self.shown is None:
+                if self.exhibit is None:
                     self.caption.content = panels.styled(panels.message(message))
                 return
             try:
-                self.show(planning.shown)
+                self.show(planning.exhibit)
             except Exception as error:
                 # A plug-in's fault, such as pictures that are none: the page says so and goes on.
                 _log.exception("What was planned cannot be shown.")
                 self.form.refuse(f"What was planned cannot be shown: {type(error).__name__}: {error}")
                 return
-            self.form.say(panels.overview(planning.shown))
+            self.form.say(panels.overview(planning.exhibit))
 
     def _run(self) -> None:
         last, watched = time.perf_counter(), 0.0
@@ -279,7 +279,7 @@ class Page:
             now = time.perf_counter()
             passed, last = now - last, now
             with self._lock:
-                timeline = self.shown.timeline if self.shown else None
+                timeline = self.exhibit.timeline if self.exhibit else None
                 if self.playing and timeline is not None:
                     pace = float(self.speed.value.removesuffix("×")) / SECONDS_PER_STEP
                     t = min(self.slider.value + passed * pace, float(timeline.n_steps))

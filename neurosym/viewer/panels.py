@@ -16,24 +16,24 @@ from PIL import Image
 from neurosym.viewer.facts import PartFacts
 
 if TYPE_CHECKING:
+    from neurosym.viewer.exhibit import Exhibit
     from neurosym.viewer.planning import Progress
-    from neurosym.viewer.shown import Shown
 
 #: Width of pictures (CSS pixels), as wide as the panel beside the view.
 WIDTH = 360
 
 
-def overview(shown: Shown) -> str:
+def overview(exhibit: Exhibit) -> str:
     """How the search ended, its figures, and notes on what is missing."""
-    search = shown.search
+    search = exhibit.search
     figures = ", ".join(
         f"{value:,} {name}" if isinstance(value, int) else f"{value:.3g} {name}"
         for name, value in search.counts.items()
     )
-    notes = "".join(f"<p class='note'>{escape(note)}</p>" for note in shown.notes)
+    notes = "".join(f"<p class='note'>{escape(note)}</p>" for note in exhibit.notes)
     mark = "✔" if search.solved else "✘"
     return (
-        f"<p><b>{escape(shown.problem.name)}</b><br>{escape(search.settings)}</p>"
+        f"<p><b>{escape(exhibit.problem.name)}</b><br>{escape(search.settings)}</p>"
         f"<p>{mark} {escape(search.sentence)}<br><span class='quiet'>{escape(figures)}</span></p>{notes}"
     )
 

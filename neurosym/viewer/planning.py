@@ -17,7 +17,7 @@ from neurosym.pipeline import ORACLES, advice, solve
 from neurosym.planning.budget import Budget
 from neurosym.planning.search_log import SearchLog
 from neurosym.registry import load_domain, planner_names, prior_names
-from neurosym.viewer.shown import REFUSED, Maker, Query, Search, Shown
+from neurosym.viewer.exhibit import REFUSED, Exhibit, Maker, Query, Search
 
 _log = logging.getLogger(__name__)
 
@@ -47,7 +47,7 @@ class Planning:
 
     def __init__(self, make: Callable[[], Problem], query: Query) -> None:
         self.query = query
-        self.shown: Shown | None = None
+        self.exhibit: Exhibit | None = None
         self.message: str | None = None
         self._make = make
         self._stop = threading.Event()
@@ -76,8 +76,8 @@ class Planning:
 
     def _run(self) -> None:
         try:
-            self.shown = self._plan()
-            if self.shown is None:
+            self.exhibit = self._plan()
+            if self.exhibit is None:
                 self.message = "Stopped before the search began."
         except REFUSED as error:
             self.message = str(error)
@@ -86,7 +86,7 @@ class Planning:
             _log.exception("Planning failed.")
             self.message = f"Planning failed with an unexpected {type(error).__name__}: {error}"
 
-    def _plan(self) -> Shown | None:
+    def _plan(self) -> Exhibit | None:
         query = self.query
         problem = self._make()
         if self._between("asking the prior", problem):
@@ -98,7 +98,7 @@ class Planning:
         settings: dict[str, Any] = {"planner": query.planner, "prior": scores, "oracle": query.oracle}
         result = solve(problem, budget=budget, rng=query.seed, **settings)
         self._between("preparing the film", problem)
-        return Shown.of(problem, Search.of(result, query, scores, stopped=self.stopped))
+        return Exhibit.of(problem, Search.of(result, query, scores, stopped=self.stopped))
 
     def _between(self, phase: str, problem: Problem) -> bool:
         """Enter a phase; whether a stop was asked for before it."""

@@ -13,8 +13,8 @@ from neurosym.geometry.readers.references import Reading
 from neurosym.language.problem import Problem
 from neurosym.plan_files.reading import SavedPlan, problem_of, read_document, read_search
 from neurosym.registry import domain_names, load_domain
+from neurosym.viewer.exhibit import Maker, Query
 from neurosym.viewer.planning import problem_maker
-from neurosym.viewer.shown import Maker, Query
 
 #: The family of assemblies that are files, and the prior that such a one is given where nobody names one.
 ASSEMBLY, UNTRAINED = "assembly", "outermost-first"

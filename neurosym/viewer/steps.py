@@ -11,7 +11,7 @@ from neurosym.viewer.panels import some
 if TYPE_CHECKING:
     from neurosym.geometry.step_motion import StepMotion
     from neurosym.language.search_problem import Rejection
-    from neurosym.viewer.shown import Search, Shown
+    from neurosym.viewer.exhibit import Exhibit, Search
 
 #: While a step of a longer list is under way, so many before it and after it are listed, to keep it in sight.
 BEFORE, AFTER = 6, 20
@@ -31,13 +31,13 @@ TRIED, BECAUSE = (213, 94, 0), (0, 114, 178)
 _HELD = f"color:#{''.join(f'{c:02x}' for c in HELD)};font-weight:bold"
 
 
-def caption(shown: Shown, t: float) -> str:
+def caption(exhibit: Exhibit, t: float) -> str:
     """Where the film is at time t, in a line."""
-    timeline, total = shown.timeline, len(shown.search.steps)
+    timeline, total = exhibit.timeline, len(exhibit.search.steps)
     now = timeline.step_at(t) if timeline else None
-    name = f"<b>{escape(shown.problem.name)}</b>"
+    name = f"<b>{escape(exhibit.problem.name)}</b>"
     if timeline is None or not total:
-        text = name if shown.search.solved else f"{name}: no plan. The tab Plan says why, as far as it is known."
+        text = name if exhibit.search.solved else f"{name}: no plan. The tab Plan says why, as far as it is known."
     elif now is not None:
         action, motion = timeline.staging.plan[now], timeline.staging.motions[now]
         moves = f"{_who(action, motion)} {_verb(motion)} {escape(motion.course)}"
@@ -50,29 +50,29 @@ def caption(shown: Shown, t: float) -> str:
     return f"<div style='min-height:2.7em;padding-top:4px'>{text}</div>"
 
 
-def steps(shown: Shown, now: int | None) -> str:
+def steps(exhibit: Exhibit, now: int | None) -> str:
     """The steps, numbered from 1; number `now` (from 0) is under way and stands out; a long list is cut round it."""
-    staging = shown.timeline.staging if shown.timeline else None
-    total = len(shown.search.steps)
+    staging = exhibit.timeline.staging if exhibit.timeline else None
+    total = len(exhibit.search.steps)
     first, end = (0, total) if now is None else _in_sight(now, total)
     guessed = staging.guessed if staging else frozenset()
     mixed = 0 < len(guessed) < total
     rows = []
     for i in range(first, end):
-        action = shown.search.steps[i]
+        action = exhibit.search.steps[i]
         motion = f" <span class='quiet'>{escape(in_short(action, staging.motions[i]))}</span>" if staging else ""
         star = " *" if mixed and i in guessed else ""
         style = " class='now' aria-current='step'" if i == now else ""
         rows.append(f"<li{style} data-step='{i}'>{escape(action)}{motion}{star}</li>")
     if not total:
-        return _none(shown) or "<p>There is nothing to do.</p>"
+        return _none(exhibit) or "<p>There is nothing to do.</p>"
     note = ""
     if guessed:
         which = "a step marked * moves" if mixed else "parts move"
         note = f"<p class='quiet'>The plan does not say how {which}: a free straight way was looked for here.</p>"
     above = f"<p class='quiet'>… {first} before</p>" if first else ""
     below = f"<p class='quiet'>… {total - end} more</p>" if end < total else ""
-    return f"{_none(shown)}{note}{above}<ol start='{first + 1}'>{''.join(rows)}</ol>{below}"
+    return f"{_none(exhibit)}{note}{above}<ol start='{first + 1}'>{''.join(rows)}</ol>{below}"
 
 
 def in_short(action: str, motion: StepMotion) -> str:
@@ -84,15 +84,15 @@ def in_short(action: str, motion: StepMotion) -> str:
     return f"{motion.course}{together}{_making_way(motion)}{_held(motion, some(motion.held))}"
 
 
-def _none(shown: Shown) -> str:
+def _none(exhibit: Exhibit) -> str:
     """Why there is no plan; nothing where there is one."""
-    if shown.search.solved:
+    if exhibit.search.solved:
         return ""
-    reasons = "".join(f"<li>{escape(sentence)}</li>" for sentence in shown.search.why_not)
+    reasons = "".join(f"<li>{escape(sentence)}</li>" for sentence in exhibit.search.why_not)
     because = f"<p><b>Why nothing more can be done</b></p><ul>{reasons}</ul>" if reasons else ""
-    if shown.search.refusals:
+    if exhibit.search.refusals:
         because += "<p>The tab Search has each refused attempt; look at one to see it in the view.</p>"
-    rest = ": the longest prefix that works is shown." if shown.search.steps else ", and no step to show."
+    rest = ": the longest prefix that works is shown." if exhibit.search.steps else ", and no step to show."
     return f"<p class='note'>No plan{rest}</p>{because}"
 
 

@@ -108,7 +108,7 @@ def _settings(planner: object, prior: object, oracle: object) -> str:
 
 
 @dataclass(frozen=True, eq=False)
-class Shown:
+class Exhibit:
     """A problem and a search, ready to be looked at; the timeline is None where the problem has no parts in space.
 
     Pictures, the observation, are uint8 (V, H, W, 3) or None; notes say what cannot be shown, and why.
@@ -121,7 +121,7 @@ class Shown:
     notes: tuple[str, ...] = ()
 
     @classmethod
-    def of(cls, problem: Problem, search: Search, notes: tuple[str, ...] = ()) -> Shown:
+    def of(cls, problem: Problem, search: Search, notes: tuple[str, ...] = ()) -> Exhibit:
         """Stage the film and take the pictures, as far as the problem has them."""
         timeline, pictures = None, None
         try:
@@ -136,7 +136,7 @@ class Shown:
         return cls(problem, search, timeline, pictures, notes)
 
     @classmethod
-    def saved(cls, saved: SavedPlan) -> Shown:
+    def saved(cls, saved: SavedPlan) -> Exhibit:
         """A plan from a file. Its prior is asked again; where that fails, a note says so."""
         scores, notes = None, []
         try:
