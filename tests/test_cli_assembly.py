@@ -14,7 +14,7 @@ import trimesh
 
 import neurosym as ns
 from neurosym.cli import main
-from neurosym.commands.assemblies import FileOptions, problem_at
+from neurosym.commands.common import FileOptions, problem_at
 from neurosym.commands.spread import spread
 from neurosym.geometry.step_motion import StepMotion
 from neurosym.plan_files.reading import read_plan

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from neurosym.commands.assemblies import AssemblyPath, FileOptions, RemovalOptions, problem_at
-from neurosym.commands.common import AsJson, print_json
+from neurosym.commands.common import AsJson, AssemblyPath, FileOptions, RemovalOptions, print_json, problem_at
 from neurosym.errors import InputError
 
 if TYPE_CHECKING:

@@ -9,12 +9,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 import typer
 
-from neurosym.commands.assemblies import FileOptions, RemovalOptions, load_assembly
 from neurosym.commands.common import (
     AsJson,
+    FileOptions,
     PictureStyle,
+    RemovalOptions,
     SearchOptions,
     family_options,
+    load_assembly,
     print_json,
     problem_options,
     write_json,

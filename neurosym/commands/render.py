@@ -8,8 +8,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from neurosym.commands.assemblies import FileOptions, load_assembly
-from neurosym.commands.common import CollapseRule, FamilyOptions, family_options, progress_bar
+from neurosym.commands.common import (
+    CollapseRule,
+    FamilyOptions,
+    FileOptions,
+    family_options,
+    load_assembly,
+    progress_bar,
+)
 from neurosym.errors import InputError
 
 if TYPE_CHECKING:

@@ -10,16 +10,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from neurosym.commands.assemblies import FileOptions, RemovalOptions
-from neurosym.commands.common import SearchOptions, family_options, say
+from neurosym.commands.common import FileOptions, RemovalOptions, SearchOptions, family_options, say
 from neurosym.errors import InputError
 
 if TYPE_CHECKING:
     from neurosym.viewer.exhibit import Exhibit
     from neurosym.viewer.sources import Source
-
-#: Where the page listens unless told otherwise: this machine alone sees it.
-LOOPBACK = "127.0.0.1"
 
 
 def view(
@@ -38,7 +34,7 @@ def view(
     search: SearchOptions,
     files: FileOptions,
     removal: RemovalOptions,
-    host: Annotated[str, typer.Option(help="Where to listen; 0.0.0.0 lets the whole network in.")] = LOOPBACK,
+    host: Annotated[str, typer.Option(help="Where to listen; 0.0.0.0 lets the whole network in.")] = "127.0.0.1",
     port: Annotated[
         int, typer.Option(min=0, max=65535, help="Where to listen; the next free one if taken, 0 any.")
     ] = 8080,
