@@ -85,7 +85,9 @@ def plan(
         assembly = load_assembly(path, files)
         problem = made(family.problem, assembly, options=options | {"name": path.resolve().name}, whose=family.name)
         source = {"assembly": reference(path, files.reading(), assembly)}
-    prior = search.prior or (NO_PRIOR if path is None else UNTRAINED)
+    prior = search.prior
+    if prior is None:
+        prior = NO_PRIOR if path is None else UNTRAINED
     budget = Budget(seconds=search.seconds, attempts=search.attempts, expansions=expansions)
     settings: dict[str, Any] = {
         "planner": planner or ("backtracking" if k is None else "best-first"),
@@ -116,13 +118,12 @@ def plan(
     raise typer.Exit(results[0].status.exit_code)
 
 
-def _path(what: str, number: int | None, cells: dict[str, Any] | None) -> Path | None:
+def _path(what: str, number: int | None, cells: object) -> Path | None:
     """The path, if that is what was given; a family's name wins where its problem is named, too."""
     from neurosym.registry import domain_names
 
-    path = Path(what)
-    if path.exists() and number is None and cells is None:
-        return path
+    if Path(what).exists() and number is None and cells is None:
+        return Path(what)
     if what not in domain_names():
         raise InputError(
             f"Expected the name of a domain, one of {', '.join(sorted(domain_names()))}, or the path of an assembly; "
@@ -131,9 +132,7 @@ def _path(what: str, number: int | None, cells: dict[str, Any] | None) -> Path |
     return None
 
 
-def _problem(
-    family: ProblemFamily, number: int | None, cells: dict[str, Any] | None, options: dict[str, Any]
-) -> Problem:
+def _problem(family: ProblemFamily, number: int | None, cells: object, options: dict[str, Any]) -> Problem:
     if (number is None) == (cells is None):
         raise InputError("Expected either --problem N or --cells FILE, one of them.")
     if cells is None:

@@ -33,9 +33,8 @@ class Form:
         self.domain = gui.add_dropdown("Domain", _offered(*given, *domain_names()), initial_value=query.domain)
         number = "" if query.number is None else str(query.number)
         self.number = gui.add_text("Problem", number, hint="its number")
-        self.options = gui.add_text(
-            "Options", _written(query.options), hint='of the domain, as key=value; removed=["V"]'
-        )
+        options = "; ".join(f"{k}={v if isinstance(v, str) else json.dumps(v)}" for k, v in query.options.items())
+        self.options = gui.add_text("Options", options, hint='of the domain, as key=value; removed=["V"]')
         planners = _offered(*planner_names(), query.planner)
         self.takes = gui.add_html("")
         self.planner = gui.add_dropdown("Planner", planners, initial_value=query.planner)
@@ -125,10 +124,6 @@ def _number(label: str, text: str, kind: Callable[[str], T], expected: str = "a 
         return kind(text)
     except ValueError:
         raise InputError(f"Expected {label} to be {expected}; got {text!r}.") from None
-
-
-def _written(options: Mapping[str, Any]) -> str:
-    return "; ".join(f"{k}={v if isinstance(v, str) else json.dumps(v)}" for k, v in options.items())
 
 
 def _read_options(text: str) -> dict[str, Any]:
