@@ -1,37 +1,40 @@
 """Polygons into triangles. A fan is right for convex ones only, so any other is cut ear by ear.
 
-Polygons of real parts are seldom quite flat, and two parts that mate share them. So a fan starts where the corners say,
-not where the file begins: the same corners give the same triangles in both parts, and the two surfaces coincide.
+Polygons of real parts are seldom quite flat, and two parts that mate share them. So cutting starts where the corners
+say, not where the file begins: the same corners give the same triangles in both parts, and the two surfaces coincide.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
+from mapbox_earcut import triangulate_float64
 
 from neurosym.support.arrays import Array, Numbers, Truths
 
 
-def triangulate(vertices: Array, polygons: Sequence[Numbers]) -> Numbers:
+def triangulate(vertices: Array, polygons: Iterable[Sequence[int] | Numbers]) -> Numbers:
     """Triangles of polygons given as numbers of vertices.
 
     Args:
         vertices: float64 (n, 3).
-        polygons: int64 (k,) each, k >= 3, nearly flat; corners may repeat, as where a hole is joined to the rim.
+        polygons: k >= 3 numbers each, nearly flat; corners may repeat, as where a hole is joined to the rim.
 
     Returns:
         int64 (m, 3), the sum of k - 2 triangles, wound as the polygons are.
     """
     found: list[Numbers] = []
-    sizes = np.array([len(p) for p in polygons], dtype=np.int64)
-    for size in np.unique(sizes):
-        same = np.array([p for p in polygons if len(p) == size], dtype=np.int64)
+    by_size: dict[int, list[Sequence[int] | Numbers]] = {}
+    for polygon in polygons:
+        by_size.setdefault(len(polygon), []).append(polygon)
+    for size, alike in sorted(by_size.items()):
+        same = np.array(alike, dtype=np.int64)
         if size == 3:
             found.append(same)
             continue
+        same = _turned(same, vertices)
         convex = _are_convex(vertices[same])
-        same[convex] = _turned(same[convex], vertices)
         fan = np.stack([np.zeros(size - 2, dtype=np.int64), np.arange(1, size - 1), np.arange(2, size)], axis=1)
         found.append(same[convex][:, fan].reshape(-1, 3))
         found.extend(polygon[_ears(vertices[polygon])] for polygon in same[~convex])
@@ -79,34 +82,13 @@ def _newell(corners: Array) -> Array:
 
 
 def _ears(corners: Array) -> Numbers:
-    """Triangles, int64 (k - 2, 3), of one polygon (k, 3), by clipping the ear that leaves the widest angle."""
+    """Triangles, int64 (k - 2, 3), of one polygon (k, 3), cut the same way from either side of it."""
     normal = _newell(corners[None])[0]
     drop = int(np.argmax(np.abs(normal)))
-    flat = np.delete(corners, drop, axis=1)
-    if (normal[drop] < 0) != (drop == 1):
-        flat = flat[:, ::-1]
-    left = list(range(len(corners)))
-    found = []
-    while len(left) > 3:
-        ring = flat[left]
-        before, after = np.roll(ring, 1, axis=0), np.roll(ring, -1, axis=0)
-        turn = _cross(ring - before, after - ring)
-        lengths = np.linalg.norm(ring - before, axis=1) * np.linalg.norm(after - ring, axis=1)
-        order = np.argsort(-turn / np.maximum(lengths, 1e-300))
-        chosen = next((int(i) for i in order if turn[i] > 0 and _is_empty(ring, int(i))), int(order[0]))
-        found.append([left[chosen - 1], left[chosen], left[(chosen + 1) % len(left)]])
-        del left[chosen]
-    return np.array([*found, left], dtype=np.int64)
-
-
-def _is_empty(ring: Array, i: int) -> bool:
-    """Whether no other corner lies in the triangle at corner `i`; corners in the same place do not count."""
-    a, b, c = ring[i - 1], ring[i], ring[(i + 1) % len(ring)]
-    within = (_cross(b - a, ring - a) >= 0) & (_cross(c - b, ring - b) >= 0) & (_cross(a - c, ring - c) >= 0)
-    at_corner = (ring == a).all(axis=1) | (ring == b).all(axis=1) | (ring == c).all(axis=1)
-    return not bool((within & ~at_corner).any())
-
-
-def _cross(u: Array, v: Array) -> Array:
-    product: Array = u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
-    return product
+    order = np.arange(len(corners))
+    front = bool((normal[drop] > 0) != (drop == 1))
+    if not front:
+        order[1:] = order[:0:-1]
+    flat = np.delete(corners, drop, axis=1)[order]
+    cut = order[triangulate_float64(flat, np.array([len(flat)], dtype=np.uint32)).reshape(-1, 3)]
+    return cut if front else cut[:, ::-1]
