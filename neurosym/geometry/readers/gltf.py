@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import base64
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
@@ -31,8 +31,9 @@ _COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
 
-#: Extensions that change nothing of the shape, by their beginning, and one that is understood.
-_HARMLESS = ("KHR_materials", "KHR_texture", "KHR_lights", "KHR_xmp", "EXT_texture", "KHR_mesh_quantization")
+#: Extensions that change nothing of the shape, by their beginning, and two that are understood.
+_HARMLESS = ("KHR_materials", "KHR_texture", "KHR_lights", "KHR_xmp", "EXT_texture")
+_UNDERSTOOD = (*_HARMLESS, "KHR_mesh_quantization", "EXT_mesh_gpu_instancing")
 
 
 def read_gltf(path: Path, *, up: str | None = None) -> Contents:
@@ -44,21 +45,22 @@ def read_gltf(path: Path, *, up: str | None = None) -> Contents:
     Raises:
         AssemblyError: it is no glTF 2.0, is compressed (Draco, meshopt), refers to files elsewhere, or is too large.
     """
-    return parse_gltf(limits.read_bytes(path), path, up=up)
+    with limits.reading("glTF 2.0", path):
+        scene = open_gltf(limits.read_bytes(path), path)
+        up = up or ("z" if "trimesh" in str(scene.tree["asset"].get("generator", "")) else "y")
+        said = "y is up, as glTF has it: turned so that z is" if up == "y" else "z is taken to be up, unturned"
+        note = Note("", "axes", 0.0, f"{path.name}: {said}.", "Load it with up='z' or up='y' if that is wrong.")
+        parts = scene.parts(Y_UP if up == "y" else np.eye(4))
+        return Contents(tuple(parts), "m", notes=(note, *scene.notes))
 
 
-def parse_gltf(data: bytes, path: Path, *, up: str | None = None) -> Contents:
-    """The same from the bytes of a file; `path` says where its buffers lie, and names it."""
+def open_gltf(data: bytes, path: Path) -> Scene:
+    """The scene in the bytes of a file; `path` says where its buffers lie, and names it."""
     with limits.reading("glTF 2.0", path):
         text, binary = _chunks(data, path) if data.startswith(b"glTF") else (data, None)
         if len(text) > limits.MAX_TEXT_BYTES:
             raise limits.too_large(path, limits.MAX_TEXT_BYTES)
-        scene = _Scene(json.loads(text.decode("utf-8")), binary, path)
-        up = up or ("z" if "trimesh" in scene.generator else "y")
-        root = Y_UP if up == "y" else np.eye(4)
-        said = "y is up, as glTF has it: turned so that z is" if up == "y" else "z is taken to be up, unturned"
-        note = Note("", "axes", 0.0, f"{path.name}: {said}.", "Load it with up='z' or up='y' if that is wrong.")
-        return Contents(tuple(scene.parts(root)), "m", notes=(note, *scene.notes))
+        return Scene(json.loads(text.decode("utf-8")), binary, path)
 
 
 def _chunks(data: bytes, path: Path) -> tuple[bytes, bytes | None]:
@@ -79,16 +81,15 @@ def _chunks(data: bytes, path: Path) -> tuple[bytes, bytes | None]:
     return found[b"JSON"], found.get(b"BIN\0")
 
 
-class _Scene:
-    """A parsed file: its JSON, its buffers as they are asked for, and what was passed over."""
+class Scene:
+    """A parsed file: its JSON (`tree`), its buffers as they are asked for, and what was passed over (`notes`)."""
 
     def __init__(self, tree: Mapping[str, Any], binary: bytes | None, path: Path) -> None:
         self.tree, self.binary, self.path = tree, binary, path
         self.notes: list[Note] = []
-        self.generator = str(tree["asset"].get("generator", ""))
         if not str(tree["asset"]["version"]).startswith("2."):
             raise AssemblyError(f"Expected glTF 2.0 in {path}; got version {tree['asset']['version']}.")
-        needed = [e for e in tree.get("extensionsRequired", []) if not str(e).startswith(_HARMLESS)]
+        needed = [e for e in tree.get("extensionsRequired", []) if not str(e).startswith(_UNDERSTOOD)]
         if needed:
             raise AssemblyError(f"Expected glTF without extensions in {path}; it needs {needed[0]}. Export it without.")
         self._buffers: dict[int, bytes] = {}
@@ -119,12 +120,21 @@ class _Scene:
             if not pieces:
                 continue
             mesh = united(str(node.get("name") or self.tree["meshes"][node["mesh"]].get("name") or ""), pieces, FLOAT32)
-            total += len(mesh.faces)
-            limits.within_limits(self.path, len(mesh.faces), total, len(found) + 1)
-            # A mirrored copy has its faces inside out.
-            faces = mesh.faces if np.linalg.det(X[:3, :3]) > 0 else mesh.faces[:, ::-1]
-            found.append(RawMesh(mesh.name, mesh.vertices @ X[:3, :3].T + X[:3, 3], faces, FLOAT32))
+            for Y in self._instances(node):
+                total += len(mesh.faces)
+                limits.within_limits(self.path, len(mesh.faces), total, len(found) + 1)
+                place = X @ Y
+                # A mirrored copy has its faces inside out.
+                faces = mesh.faces if np.linalg.det(place[:3, :3]) > 0 else mesh.faces[:, ::-1]
+                found.append(RawMesh(mesh.name, mesh.vertices @ place[:3, :3].T + place[:3, 3], faces, FLOAT32))
         return found
+
+    def _instances(self, node: Mapping[str, Any]) -> Iterable[Array]:
+        """Where the mesh of a node is put, in the node's frame: once, or as often as EXT_mesh_gpu_instancing says."""
+        given = node.get("extensions", {}).get("EXT_mesh_gpu_instancing", {"attributes": {}})["attributes"]
+        names = [name for name in ("TRANSLATION", "ROTATION", "SCALE") if name in given]
+        rows = zip(*(self._accessor(given[name]) for name in names), strict=True)
+        return (_motion(dict(zip(map(str.lower, names), row))) for row in rows) if names else [np.eye(4)]
 
     def _mesh(self, number: int) -> list[Piece]:
         """The pieces of a mesh that are made of triangles."""
