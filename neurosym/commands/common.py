@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from threading import Timer
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
@@ -17,6 +18,7 @@ from neurosym.errors import InputError
 from neurosym.language.options import read_options
 from neurosym.language.problem_family import ProblemFamily, Progress
 from neurosym.support.files import write_text
+from neurosym.support.progress import silent
 
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
@@ -41,7 +43,10 @@ FamilyOptions = Annotated[
     list[str] | None, typer.Option(metavar="KEY=VALUE", help="An option of the family's problems. May be repeated.")
 ]
 AssemblyPath = Annotated[
-    Path, typer.Argument(metavar="PATH", help="A folder with one mesh a part, a scene, a puzzle, an assembly's JSON.")
+    Path,
+    typer.Argument(
+        metavar="PATH", help="A folder with one mesh a part, a scene, a robot, a puzzle, an assembly's JSON."
+    ),
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object to stdout, and nothing else.")]
 
@@ -137,12 +142,28 @@ class FileOptions:
         int | None, typer.Option(metavar="N", min=1, help="Which problem of a puzzle's file; default 1.")
     ] = None
     solution: Annotated[int | None, typer.Option(metavar="N", min=1, help="Which of its solutions; default 1.")] = None
+    meshes: Annotated[
+        Literal["visual", "collision"] | None,
+        typer.Option(help="Of a robot: what links look like (default), or collide as."),
+    ] = None
+    joint: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME=VALUE", help="Of a robot: where a joint is; default 0. May be repeated."),
+    ] = None
 
     def reading(self) -> Reading:
         """As the library takes them."""
         from neurosym.geometry.readers.references import Reading
 
-        return Reading(**vars(self))
+        return Reading(**{**vars(self), "joint": dict(map(_joint_value, self.joint or [])) or None})
+
+
+def _joint_value(text: str) -> tuple[str, float]:
+    name, _, value = text.rpartition("=")
+    try:
+        return name, float(value)
+    except ValueError:
+        raise InputError(f"Expected a joint as NAME=VALUE, radians or metres; got {text!r}.") from None
 
 
 @dataclass(frozen=True)
@@ -178,7 +199,8 @@ def load_assembly(path: Path, files: FileOptions) -> Assembly:
     """
     if not path.exists():
         raise InputError(f"Expected a file or a folder with an assembly; there is nothing at {path}.")
-    return files.reading().load(path)
+    with progress_bar(f"reading {path.resolve().name}", after=1.0) as progress:
+        return files.reading().load(path, progress)
 
 
 def problem_at(path: Path, files: FileOptions, options: dict[str, Any]) -> Problem:
@@ -223,11 +245,25 @@ def taken_by(function: Callable[..., Any], options: Mapping[str, Any]) -> dict[s
 
 
 @contextmanager
-def progress_bar(what: str) -> Iterator[Progress]:
-    """A bar on stderr that goes away when it is done; nothing where stderr is no terminal."""
-    with progress_bars(transient=True) as bars:
-        task = bars.add_task(what, total=None)
+def progress_bar(what: str, after: float = 0.0) -> Iterator[Progress]:
+    """A bar on stderr that goes away when it is done; nothing where stderr is no terminal.
+
+    Args:
+        after: seconds until it is shown.
+    """
+    if not sys.stderr.isatty():
+        yield silent
+        return
+    bars = progress_bars(transient=True)
+    task = bars.add_task(what, total=None)
+    start = Timer(after, bars.start)
+    start.start()
+    try:
         yield lambda done, total: bars.update(task, completed=done, total=total)
+    finally:
+        start.cancel()
+        start.join()
+        bars.stop()
 
 
 def progress_bars(*, transient: bool) -> Bars:
@@ -236,7 +272,7 @@ def progress_bars(*, transient: bool) -> Bars:
     from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
     from rich.progress import Progress as Bars
 
-    columns = (BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(), TextColumn("{task.description}"))
+    columns = (BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(), TextColumn("{task.description}", markup=False))
     err = Console(stderr=True)
     # The time left is judged by the last hour: a training may take minutes.
     return Bars(*columns, console=err, transient=transient, disable=not err.is_terminal, speed_estimate_period=3600)

@@ -10,14 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from neurosym.language.semantics import Semantics
+from neurosym.support.progress import Progress as Progress
 
 if TYPE_CHECKING:
     from neurosym.language.demonstrations import Demonstrations
     from neurosym.language.domain import Domain
     from neurosym.language.problem import Problem
-
-#: Called with (done, total) while long work goes on.
-Progress = Callable[[int, int], None]
 
 
 class ProblemFamily(Semantics, ABC):

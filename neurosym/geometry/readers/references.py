@@ -13,6 +13,7 @@ import numpy as np
 from neurosym.errors import InputError
 from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.tolerances import Tolerances
+from neurosym.support.progress import Progress, silent
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,6 +26,7 @@ class Reading:
         touch: share of the smallest extent up to which faces, near or overlapping, count as touching.
         friction: Coulomb's coefficient.
         puzzle, solution: which of a puzzle file's, counted from 1.
+        meshes, joint: which meshes of a robot's links, and values of its joints.
     """
 
     units: str | None = None
@@ -33,8 +35,10 @@ class Reading:
     friction: float | None = None
     puzzle: int | None = None
     solution: int | None = None
+    meshes: str | None = None
+    joint: Mapping[str, float] | None = None
 
-    def load(self, path: str | Path) -> Assembly:
+    def load(self, path: str | Path, progress: Progress = silent) -> Assembly:
         """The assembly at a path; raises what `Assembly.load` does."""
         return Assembly.load(
             path,
@@ -44,6 +48,9 @@ class Reading:
             friction=self.friction,
             problem=1 if self.puzzle is None else self.puzzle,
             solution=1 if self.solution is None else self.solution,
+            meshes=self.meshes or "visual",
+            joints=self.joint,
+            progress=progress,
         )
 
     def as_json(self) -> dict[str, Any]:
