@@ -323,7 +323,7 @@ def deep_overlap(folder: Path) -> Path:
     return folder_of(folder, a=box(), b=box(at=(0.5, 0, 0)))
 
 
-@case("'a' and 'b' overlap by 1")
+@case("'a' and 'b' are the same solid in the same place")
 def the_same_part_twice(folder: Path) -> Path:
     return folder_of(folder, a=box(), b=box())
 
@@ -786,7 +786,7 @@ def json_with_a_cell_twice(folder: Path) -> Path:
 
 @case("overlap by 1")
 def json_with_a_cell_of_two(folder: Path) -> Path:
-    return own(folder, parts=[{"name": "a", "cells": [[0, 0, 0]]}, {"name": "b", "cells": [[0, 0, 0]]}])
+    return own(folder, parts=[{"name": "a", "cells": [[0, 0, 0], [1, 0, 0]]}, {"name": "b", "cells": [[0, 0, 0]]}])
 
 
 @case("lengths above 0")

@@ -300,7 +300,7 @@ def test_friction_beyond_what_numbers_can_tell_apart_is_answered():
         (lambda: ns.Assembly.from_meshes({"a": 3}), "vertices and faces"),
         (lambda: ns.Assembly.from_meshes({"a": ([[0, 0, 0]], [[0, 1, 2]])}), "index"),
         (lambda: ns.Assembly.from_meshes({"a": ([[0, 0, np.nan]] * 3, [[0, 1, 2]])}), "finite"),
-        (lambda: ns.Assembly.from_meshes({"a": (np.eye(3), [[0, 1, 2]])}), "closed"),
+        (lambda: ns.Assembly.from_meshes({"a": (np.eye(3), [[0, 1, 2]])}), "is open: 3 edges"),
         (lambda: ns.Assembly.from_cells({"a": [(0, 0, 0)]}).transformed(np.eye(3)), "rigid motion"),
         (lambda: ns.Assembly.from_cells({"a": [(0, 0, 0)]}).transformed(2 * np.eye(4)), "rigid motion"),
         (lambda: ns.Assembly.from_cells({"a": [(0, 0, 0)]})["b"], "name of a part"),

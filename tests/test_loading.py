@@ -27,6 +27,7 @@ from neurosym.geometry.queries import AssemblyGeometry
 from neurosym.geometry.readers.burrtools import rotations
 from neurosym.geometry.readers.contents import RawMesh
 from neurosym.geometry.readers.mesh_checks import examine
+from neurosym.geometry.readers.meshes import parts_from_meshes
 from neurosym.geometry.readers.names import distinct
 from neurosym.geometry.shapes import Body, Box, Convex, Part
 from neurosym.geometry.shapes import Mesh as MeshShape
@@ -425,7 +426,8 @@ def test_a_polygon_joined_to_its_hole_keeps_the_hole(tmp_path: Path):
 
 
 def assembled(*parts: tuple[np.ndarray, np.ndarray]) -> ns.Assembly:
-    return ns.Assembly.from_meshes({chr(97 + i): m for i, m in enumerate(parts)})
+    """Parts of which `from_meshes` would refuse those that overlap."""
+    return ns.Assembly(parts_from_meshes({chr(97 + i): m for i, m in enumerate(parts)}, Tolerances()))
 
 
 def prism(sides: int, radius: float, height: float) -> tuple[np.ndarray, np.ndarray]:

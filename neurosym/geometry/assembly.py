@@ -24,6 +24,7 @@ from neurosym.geometry.rigid_motions import are_rigid
 from neurosym.geometry.shapes import Part
 from neurosym.geometry.tolerances import DEFAULT_TOLERANCES, Tolerances
 from neurosym.support.arrays import Array, Numbers
+from neurosym.support.progress import Progress, silent
 
 #: The height of a table that is not there: infinitely far down, where nothing touches it.
 NO_TABLE = float("-inf")
@@ -88,17 +89,23 @@ class Assembly:
         cls,
         meshes: Mapping[str, Any],
         *,
+        units: str | None = None,
+        fixed: Iterable[str] = (),
         table: float | None = None,
         friction: float = FRICTION,
-        tolerances: Tolerances = DEFAULT_TOLERANCES,
+        tolerances: Tolerances | None = None,
     ) -> Assembly:
-        """Parts given as closed meshes in their assembled poses.
+        """Parts given as closed meshes in their assembled poses, looked over and refused as those that `load` reads.
 
         Args:
             meshes: name -> a `trimesh.Trimesh`, or anything with ``vertices`` (n, 3) and ``faces`` (m, 3), or a
                 pair of such arrays. A part all of whose faces lie on one cubic grid (in any pose) becomes boxes.
+            units, fixed, tolerances: as in `neurosym.geometry.readers.loading.load`.
         """
-        return cls(_reader("meshes").parts_from_meshes(meshes, tolerances), table, friction, tolerances)
+        made: Assembly = _reader("loading").from_meshes(
+            meshes, units=units, fixed=fixed, table=table, friction=friction, tolerances=tolerances
+        )
+        return made
 
     @classmethod
     def load(
@@ -112,11 +119,14 @@ class Assembly:
         up: str | None = None,
         problem: int = 1,
         solution: int = 1,
+        meshes: str = "visual",
+        joints: Mapping[str, float] | None = None,
+        progress: Progress = silent,
     ) -> Assembly:
         """An assembly from a folder of meshes or a file, looked over: see `neurosym.geometry.readers.loading.load`."""
         loaded: Assembly = _reader("loading").load(
             path, units=units, fixed=fixed, tolerances=tolerances, friction=friction, up=up, problem=problem,
-            solution=solution,
+            solution=solution, meshes=meshes, joints=joints, progress=progress,
         )  # fmt: skip
         return loaded
 

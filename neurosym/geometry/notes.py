@@ -39,11 +39,12 @@ class Note:
 class FaultyPartsError(AssemblyError):
     """Parts that cannot be used. ``notes``: every fault found, part by part."""
 
-    def __init__(self, source: str, faults: Iterable[Note]) -> None:
+    def __init__(self, source: str, faults: Iterable[Note], hint: str = "") -> None:
         self.notes = tuple(faults)
         lines = [f"  {fault}" for fault in self.notes[:SHOWN]]
         if len(self.notes) > SHOWN:
             lines.append(f"  and {len(self.notes) - SHOWN} more.")
+        lines += [hint] if hint else []
         parts = len({name for fault in self.notes for name in (fault.part, fault.other) if name})
         head = f"Expected sound parts in {source}; got {len(self.notes)} fault{'s' if len(self.notes) != 1 else ''}"
         super().__init__(f"{head} in {parts} part{'s' if parts != 1 else ''}:\n" + "\n".join(lines))

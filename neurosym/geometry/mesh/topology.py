@@ -31,8 +31,8 @@ def merged(vertices: Array, faces: Numbers, within: float = 0.0) -> tuple[Array,
     return vertices, faces
 
 
-def without_repeats(faces: Numbers) -> Numbers:
-    """The faces that have three corners, each once; a face and its mirror image, back to back, cancel."""
+def without_repeats(faces: Numbers, *, cancel: bool = True) -> Numbers:
+    """The faces that have three corners, each once; a face and its mirror image cancel, or else are one."""
     a, b, c = faces.T
     faces = faces[(a != b) & (b != c) & (c != a)]
     if not len(faces):
@@ -44,7 +44,7 @@ def without_repeats(faces: Numbers) -> Numbers:
     ways = np.zeros((len(first), 2), dtype=bool)
     ways[group, (two < three).astype(int)] = True
     kept = np.zeros(len(faces), dtype=bool)
-    kept[first] = ~ways.all(axis=1)
+    kept[first] = ~(cancel & ways.all(axis=1))
     return faces[kept]
 
 
@@ -116,6 +116,30 @@ def same_winding(faces: Numbers) -> Numbers | None:
 def shells_of(faces: Numbers) -> Numbers:
     """int64 (m,): the number of the shell that each face belongs to; shells that meet in an edge are two."""
     return _components(neighbours(faces)[0], len(faces))
+
+
+def unshared(faces: Numbers, groups: Numbers) -> tuple[Numbers, Numbers]:
+    """Faces (m, 3) numbered anew, so that those of different groups share no vertex; and what each number was."""
+    count = int(faces.max()) + 1
+    numbers, split = np.unique(faces + groups[:, None] * count, return_inverse=True)
+    return split.reshape(-1, 3).astype(np.int64), numbers % count
+
+
+def closed_shells(faces: Numbers) -> Numbers | None:
+    """The shells, if each of them is closed by itself."""
+    shells = shells_of(faces)
+    return None if len(open_edges(unshared(faces, shells)[0])[0]) else shells
+
+
+def closed_runs(faces: Numbers) -> Numbers:
+    """int64 (m,): the number of the run that each face belongs to: faces in their order, until their edges close."""
+    edge = half_edges(faces)[1]
+    face = np.arange(len(edge)) % len(faces)
+    order = np.lexsort((face, edge))
+    place = np.arange(len(edge)) - np.searchsorted(edge[order], edge[order])
+    # The first face along an edge leaves it open, the second closes it, a third opens it again.
+    opened = np.bincount(face[order], weights=1 - 2 * (place % 2), minlength=len(faces)).cumsum()
+    return np.concatenate([[0], (opened == 0).cumsum()[:-1]])
 
 
 def closes_at_junctions(vertices: Array, faces: Numbers, within: float) -> bool:

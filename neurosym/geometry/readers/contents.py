@@ -50,6 +50,8 @@ class Contents:
         fixed: names of parts that never move.
         table, friction, tolerances: as in `Assembly`; None where the file says nothing.
         notes: what was odd but harmless.
+        separate: whether solids of one mesh are parts of their own.
+        hint: what to try where parts cannot be used; empty: what each fault says.
     """
 
     parts: tuple[RawMesh | Part, ...]
@@ -59,6 +61,8 @@ class Contents:
     friction: float | None = None
     tolerances: Tolerances | None = None
     notes: tuple[Note, ...] = ()
+    separate: bool = False
+    hint: str = ""
 
 
 def united(name: str, pieces: Sequence[tuple[Array, Numbers]], rounding: float = FLOAT64) -> RawMesh:

@@ -6,9 +6,10 @@ Each format's reader gives what stands in the file. Here units are settled (`con
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -23,16 +24,20 @@ from neurosym.geometry.readers.contents import Contents, RawMesh
 from neurosym.geometry.readers.conversion import in_units, upright
 from neurosym.geometry.readers.folder import MESHES, read_folder, read_mesh
 from neurosym.geometry.readers.gltf import read_gltf
+from neurosym.geometry.readers.limits import within_limits
 from neurosym.geometry.readers.mating import floating, mating_tolerances
 from neurosym.geometry.readers.mesh_checks import examine
-from neurosym.geometry.readers.meshes import parts_from_meshes
+from neurosym.geometry.readers.meshes import as_triangles, parts_from_meshes
 from neurosym.geometry.readers.names import distinct
 from neurosym.geometry.readers.obj import read_obj
+from neurosym.geometry.readers.solids import separate
 from neurosym.geometry.readers.step import read_step
 from neurosym.geometry.readers.threemf import read_3mf
+from neurosym.geometry.readers.urdf import read_urdf
 from neurosym.geometry.shapes import Box, Convex, Part
 from neurosym.geometry.tolerances import DEFAULT_TOLERANCES, Tolerances
 from neurosym.geometry.units import unit
+from neurosym.support.progress import Progress, silent
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,10 +47,15 @@ class Options:
     up: str | None
     problem: int
     solution: int
+    meshes: str
+    joints: Mapping[str, float] | None
 
 
 #: Formats that have a word on what is up themselves; their reader heeds `up`.
 _TURNED_BY_READER = (".glb", ".gltf")
+
+#: Formats of meshes alone: what is one mesh in such a file may be many solids.
+_MESH_FILES = (".glb", ".gltf", ".3mf", *MESHES)
 
 _READERS: dict[str, Callable[[Path, Options], Contents]] = {
     ".glb": lambda path, options: read_gltf(path, up=options.up),
@@ -56,6 +66,7 @@ _READERS: dict[str, Callable[[Path, Options], Contents]] = {
     ".xmpuzzle": lambda path, options: read_xmpuzzle(path, problem=options.problem, solution=options.solution),
     ".json": lambda path, options: read_json(path, read_mesh),
     ".obj": lambda path, options: read_obj(path, split=True),
+    ".urdf": lambda path, options: read_urdf(path, read_mesh, meshes=options.meshes, joints=options.joints),
     **{ending: (lambda path, options: MESHES[path.suffix.lower()](path)) for ending in MESHES if ending != ".obj"},
 }
 
@@ -70,21 +81,26 @@ def load(
     up: str | None = None,
     problem: int = 1,
     solution: int = 1,
+    meshes: str = "visual",
+    joints: Mapping[str, float] | None = None,
+    progress: Progress = silent,
 ) -> Assembly:
     """An assembly from a folder of meshes or from a file, looked over.
 
     Args:
         path: a folder with one mesh a part (OBJ, STL, PLY, OFF; see `neurosym.geometry.readers.folder`), or a file:
-            GLB, glTF, 3MF, STEP (extra ``cad``), BurrTools ``.xmpuzzle``, the JSON that `Assembly.save` writes (see
-            `neurosym.geometry.readers.assembly_json`), or one mesh. Parts are named after files or nodes.
+            GLB, glTF, 3MF, STEP (extra ``cad``), URDF, BurrTools ``.xmpuzzle``, the JSON that `Assembly.save` writes
+            (see `neurosym.geometry.readers.assembly_json`), or one mesh. Parts are named after files or nodes.
         units: the unit of the assembly's lengths ("mm", "m", "in", ...). Of a format that states its own (glTF and
-            STEP metres, 3MF and JSON what they say) lengths are converted to it; of others it says what they are.
+            URDF metres, STEP, 3MF and JSON what they say) lengths are converted to it; of others it says what they are.
         fixed: names of parts that never move, besides those that the files name.
-        tolerances: kept as they are where given. Otherwise touch is raised, to at most 5% of the smallest extent,
-            so that mating faces that overlap a little at rest count as touching; `notes` says by how much.
+        tolerances: kept as they are where given. Otherwise touch is raised so that mating faces that overlap at rest,
+            by no more than `tolerances.mate`, count as touching; `notes` says by how much.
         friction: Coulomb's coefficient; None: the file's, else 0.5.
         up: "y" or "z", what is up in the files; None: z, but in glTF see `neurosym.geometry.readers.gltf`.
         problem, solution: which of a puzzle file's, counted from 1.
+        meshes, joints: of URDF, which meshes of links, "visual" or "collision", and values of joints (radians, metres).
+        progress: called with (done, total) parts that were looked over.
 
     Returns:
         The assembly; `notes` says what was seen and mended.
@@ -96,27 +112,63 @@ def load(
         InputError: an unknown unit, part or number of a problem.
         MissingDependencyError: STEP without cascadio.
     """
-    source, options = Path(path), Options(up=up, problem=problem, solution=solution)
+    source, options = Path(path), Options(up=up, problem=problem, solution=solution, meshes=meshes, joints=joints)
     if options.up not in (None, "y", "z"):
         raise InputError(f'Expected up as "y", "z" or None; got {options.up!r}.')
     contents = _read(source, options)
     contents, notes = in_units(contents, None if units is None else unit(units), source)
+    if contents.separate:
+        contents = separate(contents)
+        within_limits(source, 0, parts=len(contents.parts))
     names, renamed = distinct([part.name for part in contents.parts])
-    parts, mended, faults = _examined([replace(p, name=n) for p, n in zip(contents.parts, names)])
+    contents = replace(
+        contents,
+        parts=tuple(replace(part, name=name) for part, name in zip(contents.parts, names)),
+        fixed=(*contents.fixed, *fixed),
+        tolerances=tolerances or contents.tolerances,
+        friction=contents.friction if friction is None else friction,
+        notes=(*notes, *contents.notes, *renamed),
+    )
+    return _checked(contents, str(source), progress)
+
+
+def from_meshes(
+    meshes: Mapping[str, Any],
+    *,
+    units: str | None = None,
+    fixed: Iterable[str] = (),
+    table: float | None = None,
+    friction: float | None = None,
+    tolerances: Tolerances | None = None,
+    progress: Progress = silent,
+) -> Assembly:
+    """What `Assembly.from_meshes` does; the meshes are looked over as if they came from files."""
+    if not isinstance(meshes, Mapping) or not meshes or not all(name and isinstance(name, str) for name in meshes):
+        raise AssemblyError(f"Expected parts as {{name: mesh}}, at least one mesh; got {meshes!r:.80}.")
+    raw = tuple(RawMesh(name, *as_triangles(name, mesh)) for name, mesh in meshes.items())
+    stated = None if units is None else unit(units)
+    return _checked(Contents(raw, stated, tuple(fixed), table, friction, tolerances), "the meshes", progress)
+
+
+def _checked(contents: Contents, source: str, progress: Progress) -> Assembly:
+    """The assembly, once all its parts are found to be sound, one by one and where they lie."""
+    total = len(contents.parts) + 1
+    parts, mended, faults = _examined(contents.parts, lambda done: progress(done, total))
     if not parts:
-        raise FaultyPartsError(str(source), faults)
+        raise FaultyPartsError(source, faults, contents.hint)
     lost = {fault.part for fault in faults}
-    held = tuple(name for name in dict.fromkeys((*contents.fixed, *fixed)) if name not in lost)
+    held = tuple(name for name in dict.fromkeys(contents.fixed) if name not in lost)
     check_fixed(held, [part.name for part in parts])
     bodies, mask = Bodies(parts), sum(1 << i for i, part in enumerate(parts) if part.name in held)
-    mated, mating, deep = mating_tolerances(bodies, mask, tolerances or contents.tolerances)
+    mated, mating, deep = mating_tolerances(bodies, mask, contents.tolerances)
     if faults or deep:
-        raise FaultyPartsError(str(source), [*faults, *deep])
+        raise FaultyPartsError(source, [*faults, *deep], contents.hint)
     ground = float(bodies.bounds[:, 0, 2].min()) if contents.table is None else contents.table
     loose = floating(bodies, mask, ground, mated.touch * bodies.smallest_extent)
-    notes += [*contents.notes, *renamed, *mended, *mating, *loose]
-    coefficient = next(value for value in (friction, contents.friction, FRICTION) if value is not None)
-    return Assembly(parts, contents.table, coefficient, mated, held, contents.units, tuple(notes))
+    progress(total, total)
+    friction = FRICTION if contents.friction is None else contents.friction
+    notes = (*contents.notes, *mended, *mating, *loose)
+    return Assembly(parts, contents.table, friction, mated, held, contents.units, notes)
 
 
 def _read(source: Path, options: Options) -> Contents:
@@ -135,6 +187,8 @@ def _read(source: Path, options: Options) -> Contents:
     if options.up == "y" and source.suffix.lower() == ".json":
         raise InputError(f'Expected no up="y" with {source.name}: in an assembly\'s JSON z is up.')
     contents = _READERS[source.suffix.lower()](source, options)
+    if len(contents.parts) == 1 and source.suffix.lower() in _MESH_FILES:
+        contents = replace(contents, separate=True)
     if options.up == "y" and source.suffix.lower() not in _TURNED_BY_READER:
         contents = upright(contents)
     if not contents.parts:
@@ -142,12 +196,15 @@ def _read(source: Path, options: Options) -> Contents:
     return contents
 
 
-def _examined(given: list[RawMesh | Part]) -> tuple[tuple[Part, ...], list[Note], list[Note]]:
-    """Sound parts in order, what was found, and what is wrong with the others."""
+def _examined(
+    given: Sequence[RawMesh | Part], progress: Callable[[int], None]
+) -> tuple[tuple[Part, ...], list[Note], list[Note]]:
+    """Sound parts in order, what was found, and what is wrong with the others; `progress` is told how many are done."""
     notes: list[Note] = []
     faults: list[Note] = []
     sound: list[RawMesh | Part] = []
-    for part in given:
+    for number, part in enumerate(given):
+        progress(number)
         if isinstance(part, Part):
             wrong = _wrong(part)
         else:
@@ -159,14 +216,14 @@ def _examined(given: list[RawMesh | Part]) -> tuple[tuple[Part, ...], list[Note]
         if not wrong:
             sound.append(part)
     # Meshes in the world's frame are looked at together: puzzles are on one grid.
-    together = {m.name: m for m in sound if isinstance(m, RawMesh) and m.X_WP is None}
-    made = {p.name: p for p in parts_from_meshes(together, DEFAULT_TOLERANCES)} if together else {}
+    together = {m.name: (m.vertices, m.faces) for m in sound if isinstance(m, RawMesh) and m.X_WP is None}
+    made = {p.name: p for p in parts_from_meshes(together, DEFAULT_TOLERANCES)}
     parts = []
     for part in sound:
         if isinstance(part, Part):
             parts.append(part)
             continue
-        own = made.get(part.name) or parts_from_meshes({part.name: part}, DEFAULT_TOLERANCES)[0]
+        own = made.get(part.name) or parts_from_meshes({part.name: (part.vertices, part.faces)}, DEFAULT_TOLERANCES)[0]
         parts.append(replace(own, X_WP=own.X_WP if part.X_WP is None else part.X_WP, density=part.density))
     return tuple(parts), notes, faults
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from neurosym.geometry.bodies import Bodies
 from neurosym.geometry.contact.collision import Gaps
@@ -13,11 +14,12 @@ from neurosym.geometry.mesh.broad_phase import overlapping_pairs
 from neurosym.geometry.notes import Note
 from neurosym.geometry.tolerances import DEFAULT_TOLERANCES, Tolerances
 
-#: Mating faces may overlap by this share of the smallest extent: measured on timber joints, answers held so far.
-MAX_MATING = 5e-2
+#: The touching tolerance is raised to the measured overlap times `ABOVE`, or to `WIDEST` where that is enough: measured
+#: on timber joints, answers hold so far.
+ABOVE, WIDEST = 1.2, 5e-2
 
-#: The touching tolerance is raised to the measured overlap times this.
-_ABOVE = 1.2
+#: A touching tolerance beyond this share of the smallest extent is not to be had on the command line.
+MAX_TOUCH = 0.5
 
 
 def mating_tolerances(
@@ -27,38 +29,42 @@ def mating_tolerances(
 
     Args:
         fixed: a bitset of parts that may overlap one another.
-        stated: tolerances that were given: they are kept, and say how deep an overlap may be.
+        stated: tolerances that were given: they are kept.
     """
     tolerances, smallest = stated or DEFAULT_TOLERANCES, bodies.smallest_extent
-    limit = tolerances.touch if stated else max(MAX_MATING, tolerances.touch)
-    deepest: dict[tuple[str, str], float] = {}
+    limit = max(tolerances.touch, tolerances.mate)
+    deepest: dict[tuple[int, int], float] = {}
     for overlap in overlaps(bodies, fixed):
-        a, b = (bodies.parts[bodies.owners[i]].name for i in (overlap.a, overlap.b))
-        deepest[a, b] = max(deepest.get((a, b), 0.0), overlap.depth)
-    faults = [
-        Note(
-            a,
-            "overlap",
-            depth,
-            f"Parts {a!r} and {b!r} overlap by {depth:.4g}, {depth / smallest:.2g} of the smallest extent of any part; "
-            f"mating faces may by {limit:g} of it.",
-            f"Move them apart; if they are meant to mate so, state Tolerances(touch={1.1 * depth / smallest:.2g}), "
-            "--touch on the command line.",
-            b,
-        )
-        for (a, b), depth in deepest.items()
-        if depth > limit * smallest
-    ]
+        pair = int(bodies.owners[overlap.a]), int(bodies.owners[overlap.b])
+        deepest[pair] = max(deepest.get(pair, 0.0), overlap.depth)
     slight = {pair: depth for pair, depth in deepest.items() if depth <= limit * smallest}
+    faults = [_too_deep(bodies, *pair, depth, limit) for pair, depth in deepest.items() if pair not in slight]
     share = max(slight.values(), default=0.0) / smallest
-    if share <= tolerances.touch:
+    if stated or share <= tolerances.touch:
         return tolerances, [], faults
-    (a, b), depth = max(slight.items(), key=lambda item: item[1])
-    touch = max(min(_ABOVE * share, MAX_MATING), 1.01 * share)
+    pair, depth = max(slight.items(), key=lambda item: item[1])
+    a, b = (bodies.parts[i].name for i in pair)
+    touch = max(min(ABOVE * share, WIDEST), 1.01 * share)
     pairs = "one pair of parts" if len(slight) == 1 else f"{len(slight)} pairs of parts"
     said = f"Mating faces of {pairs} overlap, by up to {depth:.4g} between {a!r} and {b!r}; "
     said += f"overlaps up to {touch * smallest:.4g} ({touch:.2g} of the smallest extent) are taken for touch."
     return replace(tolerances, touch=touch), [Note(a, "mating", depth, said, other=b)], faults
+
+
+def _too_deep(bodies: Bodies, i: int, j: int, depth: float, limit: float) -> Note:
+    a, b = (bodies.parts[k].name for k in (i, j))
+    share = depth / bodies.smallest_extent
+    corners = [np.concatenate([bodies.vertices(int(k)) for k in np.flatnonzero(bodies.owners == n)]) for n in (i, j)]
+    apart = max(cKDTree(u).query(v)[0].max() for u, v in (corners, corners[::-1]))
+    if apart <= DEFAULT_TOLERANCES.touch * bodies.smallest_extent:
+        said = f"Parts {a!r} and {b!r} are the same solid in the same place."
+        return Note(a, "overlap", depth, said, "Take one of them away.", b)
+    said = f"Parts {a!r} and {b!r} overlap by {depth:.4g}, {share:.2g} of the smallest extent of any part; "
+    remedy = "Move them apart."
+    if 1.1 * share <= MAX_TOUCH:
+        remedy = f"Move them apart; if they are meant to mate so, state Tolerances(touch={1.1 * share:.2g}), "
+        remedy += "--touch on the command line."
+    return Note(a, "overlap", depth, said + f"mating faces may by {limit:g} of it.", remedy, b)
 
 
 def floating(bodies: Bodies, fixed: int, ground: float, touch: float) -> list[Note]:
@@ -89,6 +95,9 @@ def floating(bodies: Bodies, fixed: int, ground: float, touch: float) -> list[No
         above = float(bodies.part_bounds[part, 0, 2] - ground)
         sentence = f"Part {name!r} touches nothing: it is {above:.4g} above the ground"
         sentence += f", and {least:.4g} from {nearest!r}, the nearest part." if nearest else "."
-        remedy = "Move it, fix it, or state a larger Tolerances(touch=), --touch on the command line."
+        share = 1.1 * min(above, least) / bodies.smallest_extent
+        remedy = "Move it, or fix it."
+        if share <= MAX_TOUCH:
+            remedy = f"Move it, fix it, or state Tolerances(touch={share:.2g}), --touch on the command line."
         notes.append(Note(name, "floating", min(above, least), sentence, remedy))
     return notes

@@ -128,22 +128,25 @@ def _closed(vertices: Array, faces: Numbers, found: _Findings) -> tuple[Array, N
     """The mesh with its vertices merged, its faces of no area dropped, wound one way; faults where it is open."""
     given = len(faces)
     extent = float(np.ptp(vertices[np.unique(faces)], axis=0).max())
-    vertices, faces = topology.merged(vertices, faces)
-    faces = topology.without_repeats(faces)
+    exact, joined = topology.merged(vertices, faces)
+    vertices, merged = topology.merged(exact, joined, MERGE * extent)
+    faces = topology.without_repeats(merged)
     half, winding = topology.open_edges(faces) if len(faces) else (np.zeros((0, 2)), False)
-    if len(half):
-        nearer, fewer = topology.merged(vertices, faces, MERGE * extent)
-        fewer = topology.without_repeats(fewer)
-        again, winding_again = topology.open_edges(fewer) if len(fewer) else (half, False)
-        if len(again) < len(half):
-            found.note("merged", len(vertices) - len(nearer), f"has corners up to {MERGE * extent:.2g} apart made one")
-            vertices, faces, half, winding = nearer, fewer, again, winding_again
+    if len(half) or not len(faces):
+        once = topology.without_repeats(merged, cancel=False)
+        turned = topology.same_winding(once) if len(once) > len(faces) else None
+        if turned is not None and not len(topology.open_edges(turned)[0]):
+            found.note("doubled", len(once), "had faces twice, wound both ways, as if hollow; each was taken once")
+            return vertices, turned
+    elif len(vertices) < len(exact) and len(topology.open_edges(topology.without_repeats(joined))[0]):
+        found.note("merged", len(exact) - len(vertices), f"has corners up to {MERGE * extent:.2g} apart made one")
     if not len(faces):
         found.fault("flat", 0, "encloses nothing: its faces cancel or are lines", "Give it a thickness.")
         return vertices, faces
     if len(faces) < given:
         dropped = given - len(faces)
-        found.note("degenerate", dropped, f"had {dropped} faces of no area or given twice, which were dropped")
+        said = f"had {dropped} faces of no area, given twice or back to back, which were dropped"
+        found.note("degenerate", dropped, said)
     if winding:
         turned = topology.same_winding(faces)
         if turned is None:
@@ -174,10 +177,8 @@ def _outward(vertices: Array, faces: Numbers, found: _Findings) -> Numbers:
         remedy = "Give it a thickness, or wind its faces one way."
         found.fault("flat", total, f"encloses no volume ({total:.2g})", remedy)
         return faces
-    turned = np.zeros(len(volumes), dtype=bool)
-    if total < 0:
-        turned[:] = True
-    if 1 < len(volumes) <= MAX_SHELLS:
+    turned = np.full(len(volumes), total < 0)
+    if 1 < len(volumes) <= MAX_SHELLS and topology.closed_shells(faces) is not None:
         for k, volume in enumerate(np.where(turned, -volumes, volumes)):
             around, point = vertices[faces[shells != k]], vertices[faces[shells == k][:1]].mean(axis=1)
             inside = bool(triangles.are_inside(point, around[:, ::-1] if total < 0 else around)[0])
@@ -206,7 +207,7 @@ def _look_for_crossings(vertices: Array, faces: Numbers, found: _Findings) -> No
         return
     shells = topology.shells_of(faces)
     if not len(pairs):
-        _look_for_nested(vertices, faces, shells, found)
+        _look_for_nested(vertices, faces, found)
         return
     i, j = pairs.T
     within = shells[i] == shells[j]
@@ -223,14 +224,20 @@ def _look_for_crossings(vertices: Array, faces: Numbers, found: _Findings) -> No
         found.note("self-intersecting", count, said, UNITE)
 
 
-def _look_for_nested(vertices: Array, faces: Numbers, shells: Numbers, found: _Findings) -> None:
-    volumes = topology.shell_volumes(vertices, faces, shells)
-    if not 1 < len(volumes) <= MAX_SHELLS:
+def _look_for_nested(vertices: Array, faces: Numbers, found: _Findings) -> None:
+    shells = topology.closed_shells(faces)
+    if shells is None or shells.max() == 0:
         return
-    for k in np.flatnonzero(volumes > 0):
+    volumes = topology.shell_volumes(vertices, faces, shells)
+    solids = np.flatnonzero(volumes > 0)
+    nested = False
+    for k in solids if len(volumes) <= MAX_SHELLS else ():
         if triangles.are_inside(vertices[faces[shells == k][:1]].mean(axis=1), vertices[faces[shells != k]])[0]:
             said = f"is made of solids inside one another; its volume counts {volumes[k]:.4g} twice"
             found.note("self-intersecting", volumes[k], said, UNITE)
+            nested = True
+    if len(solids) > 1 and not nested:
+        found.note("solids", len(solids), f"is made of {len(solids)} solids side by side, which move as one")
 
 
 def _folds(vertices: Array, faces: Numbers, margin: float) -> int:

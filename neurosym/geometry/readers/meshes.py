@@ -1,4 +1,4 @@
-"""Meshes as parts: checked, and turned into boxes where they are unions of cubes of one grid."""
+"""Sound meshes as parts, turned into boxes where they are unions of cubes of one grid."""
 
 from __future__ import annotations
 
@@ -26,44 +26,24 @@ MAX_UNIT_CUBES = 1_000
 _PROBE = np.array([0.5 + 0.1371, 0.5 + 0.0713, 0.5 + 0.0291])
 
 
-def parts_from_meshes(meshes: Mapping[str, Any], tolerances: Tolerances) -> tuple[Part, ...]:
-    """One part a mesh, all in the world's frame."""
-    triangles = {name: _triangles(name, mesh) for name, mesh in meshes.items()}
-    if not triangles:
-        raise AssemblyError("Expected at least one mesh; got none.")
-    cubes = _common_grid(triangles, tolerances)
-    return tuple(
-        Part(name, cubes[name] if name in cubes else (_one_body(*triangles[name]),), np.eye(4)) for name in triangles
-    )
-
-
-def _triangles(name: str, mesh: Any) -> Triangles:
+def as_triangles(name: str, mesh: Any) -> Triangles:
+    """Vertices (n, 3) and faces (m, 3) of anything that has them, or is a pair of them."""
     try:
         vertices, faces = (mesh.vertices, mesh.faces) if hasattr(mesh, "vertices") else mesh
         v, f = np.array(vertices, dtype=np.float64), np.array(faces, dtype=np.int64)
     except (TypeError, ValueError) as error:
         raise AssemblyError(f"Part {name!r}: expected a mesh with vertices and faces; got {mesh!r}: {error}.") from None
-    if v.ndim != 2 or v.shape[1] != 3 or f.ndim != 2 or f.shape[1] != 3 or not len(v) or not len(f):
-        raise AssemblyError(
-            f"Part {name!r}: expected vertices (n, 3) and faces (m, 3), not empty; got {v.shape} and {f.shape}."
-        )
-    if f.min() < 0 or f.max() >= len(v):
-        raise AssemblyError(
-            f"Part {name!r}: expected faces that index its {len(v)} vertices; got {f.min()} to {f.max()}."
-        )
-    if not np.isfinite(v).all():
-        raise AssemblyError(f"Part {name!r}: expected finite coordinates; got NaN or infinity.")
-    volume = signed_volume(v, f)
-    extent = float(np.ptp(v, axis=0).max())
-    # On a closed surface the area vectors of the faces cancel.
-    areas = area_vectors(v[f])
-    if np.linalg.norm(areas.sum(axis=0)) > 1e-6 * np.linalg.norm(areas, axis=1).sum():
-        raise AssemblyError(
-            f"Part {name!r}: expected a closed mesh; its faces leave a gap. Fill it (trimesh.repair.fill_holes)."
-        )
-    if abs(volume) <= 1e-12 * extent**3:
-        raise AssemblyError(f"Part {name!r}: expected a mesh that encloses a volume; it encloses none.")
-    return v, f if volume > 0 else f[:, ::-1]
+    if v.ndim != 2 or v.shape[1] != 3 or f.ndim != 2 or f.shape[1] != 3:
+        raise AssemblyError(f"Part {name!r}: expected vertices (n, 3) and faces (m, 3); got {v.shape} and {f.shape}.")
+    return v, f
+
+
+def parts_from_meshes(meshes: Mapping[str, Triangles], tolerances: Tolerances) -> tuple[Part, ...]:
+    """One part a sound mesh (closed, its faces outward), all in the world's frame."""
+    cubes = _common_grid(meshes, tolerances) if meshes else {}
+    return tuple(
+        Part(name, cubes[name] if name in cubes else (_one_body(*meshes[name]),), np.eye(4)) for name in meshes
+    )
 
 
 def _one_body(vertices: Array, faces: Numbers) -> Body:

@@ -1,7 +1,8 @@
-"""STL, binary or text: triangles without names. Several solids in one file are one part."""
+"""STL, binary or text: triangles, in text perhaps of several solids with names."""
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 from neurosym.errors import AssemblyError
 from neurosym.geometry.readers.contents import FLOAT32, Contents, RawMesh
 from neurosym.geometry.readers.limits import read_bytes, reading, within_limits
+from neurosym.geometry.readers.solids import by_name
 from neurosym.support.arrays import Array
 
 _HEADER = 80
@@ -17,7 +19,7 @@ _TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attrib
 
 
 def read_stl(path: Path) -> Contents:
-    """One mesh; normals and colours are passed over, for corners say which way a face looks.
+    """A mesh for each solid; normals and colours are passed over, for corners say which way a face looks.
 
     Raises:
         AssemblyError: neither its length nor its words are those of STL.
@@ -25,10 +27,13 @@ def read_stl(path: Path) -> Contents:
     data = read_bytes(path)
     with reading("STL", path):
         binary = _binary(data)
-        corners = _text(data, path) if binary is None else binary.astype(np.float64)
-        within_limits(path, len(corners))
-        faces = np.arange(3 * len(corners), dtype=np.int64).reshape(-1, 3)
-        return Contents((RawMesh(path.stem, corners.reshape(-1, 3), faces, FLOAT32),))
+        solids = [("", binary.astype(np.float64))] if binary is not None else _text(data, path)
+        for _, corners in solids:
+            within_limits(path, len(corners), sum(len(own) for _, own in solids))
+        names = [name if len(solids) > 1 else path.stem for name, _ in solids]
+        faces = (np.arange(3 * len(corners), dtype=np.int64).reshape(-1, 3) for _, corners in solids)
+        meshes = [RawMesh(n, c.reshape(-1, 3), f, FLOAT32) for n, (_, c), f in zip(names, solids, faces)]
+        return by_name(path, meshes)
 
 
 def _binary(data: bytes) -> NDArray[np.float32] | None:
@@ -45,14 +50,22 @@ def _binary(data: bytes) -> NDArray[np.float32] | None:
     return corners
 
 
-def _text(data: bytes, path: Path) -> Array:
-    words = data.decode("utf-8", errors="replace").split()
-    if not words or words[0].lower() != "solid" or "endsolid" not in (w.lower() for w in words[-20:]):
+def _text(data: bytes, path: Path) -> list[tuple[str, Array]]:
+    """Solids that have facets: the name, and corners (m, 3, 3)."""
+    text = "\n".join(data.decode("utf-8", errors="replace").splitlines())
+    starts = list(re.finditer(r"^[ \t]*solid\b(.*)$", text, re.MULTILINE | re.IGNORECASE))
+    if not starts or text[: starts[0].start()].strip() or "endsolid" not in text[-1000:].lower():
         said = f"{len(data):,} bytes fit no count of triangles, and no text from `solid` to `endsolid`"
         raise AssemblyError(f"Expected STL in {path}; its {said}. It may be cut off: export it again.")
-    lower = [w.lower() for w in words]
-    at = [i for i, word in enumerate(lower) if word == "vertex"]
-    facets, corners = lower.count("facet"), np.array([words[i + 1 : i + 4] for i in at])
-    if len(at) != 3 * facets:
-        raise AssemblyError(f"Expected three corners a facet in {path}; it has {facets} facets and {len(at)} corners.")
-    return corners.astype(np.float64).reshape(-1, 3, 3)
+    solids = []
+    for start, end in zip(starts, [*(s.start() for s in starts[1:]), len(text)]):
+        words = text[start.end() : end].split()
+        lower = [w.lower() for w in words]
+        at = [i for i, word in enumerate(lower) if word == "vertex"]
+        facets, corners = lower.count("facet"), np.array([words[i + 1 : i + 4] for i in at])
+        if len(at) != 3 * facets:
+            raise AssemblyError(
+                f"Expected three corners a facet in {path}; it has {facets} facets and {len(at)} corners."
+            )
+        solids.append((start[1].strip(), corners.astype(np.float64).reshape(-1, 3, 3)))
+    return [solid for solid in solids if len(solid[1])] or solids[:1]

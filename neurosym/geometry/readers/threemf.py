@@ -15,12 +15,16 @@ import numpy as np
 from defusedxml.ElementTree import iterparse
 
 from neurosym.errors import AssemblyError
+from neurosym.geometry.notes import Note
 from neurosym.geometry.readers.contents import Contents, RawMesh
 from neurosym.geometry.readers.limits import MAX_TEXT_BYTES, limited, read_bytes, reading, within_limits
 from neurosym.support.arrays import Array
 
 #: Objects within objects may be this deep.
 MAX_DEPTH = 32
+
+#: Types of objects that are parts; others hold parts up while they are printed, or are surfaces.
+_PARTS = ("model", "solidsupport")
 
 _RELATIONS, _MODEL = "_rels/.rels", "3D/3dmodel.model"
 
@@ -55,6 +59,7 @@ def read_3mf(path: Path) -> Contents:
         main = _root(archive, path)
         root = _model(archive, main, models, path)
         found: list[RawMesh] = []
+        left: list[str] = []
         total = 0
         # (model, object, transform, name, depth), the last on top.
         stack = [(m or main, i, X, name, 0) for m, i, X, name in reversed(root.items)]
@@ -64,16 +69,20 @@ def read_3mf(path: Path) -> Contents:
             if depth > MAX_DEPTH:
                 raise AssemblyError(f"Expected objects at most {MAX_DEPTH} deep in {path}; they go on, or in a circle.")
             name = thing.name or name
+            if thing.kind not in _PARTS:
+                left.append(f"{name or number!r} ({thing.kind})")
+                continue
             stack += [(m or model, i, X @ Y, name, depth + 1) for m, i, Y in reversed(thing.components)]
             within_limits(path, len(thing.faces), total, len(found) + len(stack))
-            if thing.components or thing.kind != "model":
+            if thing.components:
                 continue
             total += len(thing.faces)
             vertices = np.array(thing.vertices, dtype=np.float64).reshape(-1, 3) @ X[:3, :3].T + X[:3, 3]
             faces = np.array(thing.faces, dtype=np.int64).reshape(-1, 3)
             faces = faces if np.linalg.det(X[:3, :3]) > 0 else faces[:, ::-1]
             found.append(RawMesh(name or f"object-{number}", vertices, faces))
-        return Contents(tuple(found), root.unit)
+        said = f"{path.name}: {len(left)} objects that are no parts were left out: {', '.join(left[:5])}."
+        return Contents(tuple(found), root.unit, notes=(Note("", "skipped", len(left), said),) if left else ())
 
 
 def _root(archive: zipfile.ZipFile, path: Path) -> str:
@@ -103,7 +112,7 @@ def _model(archive: zipfile.ZipFile, name: str, known: dict[str, _Model], path: 
                 model.unit = element.get("unit", "millimeter")
             elif tag == "object":
                 thing = model.objects[element.attrib["id"]] = _Object(element.get("name", ""))
-                thing.kind = "model" if element.get("type", "model") in ("model", "solidsupport") else "other"
+                thing.kind = element.get("type", "model")
             continue
         if tag == "vertex":
             thing.vertices.append((float(element.attrib["x"]), float(element.attrib["y"]), float(element.attrib["z"])))
