@@ -1,6 +1,6 @@
 """Broken inputs, each made by a few lines and with the words that its error has to say.
 
-    python tests/broken_inputs.py FOLDER     writes them all, one folder a case, to be looked at or loaded by hand.
+python tests/broken_inputs.py FOLDER     writes them all, one folder a case, to be looked at or loaded by hand.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 import trimesh
+from step_files import step_bolted, step_boxes
 
 Mesh = tuple[np.ndarray, np.ndarray]
 
@@ -154,6 +155,18 @@ def puzzle(folder: Path, grid: str = "0", cells: str = "##", placed: str | None 
     solution = "" if placed is None else f"<solution><assembly>{placed}</assembly></solution>"
     text = PUZZLE.format(grid=grid, cells=cells, solution=solution)
     return write(folder / "a.xmpuzzle", gzip.compress(text.encode()))
+
+
+def robot(*more: str, shape: str = '<box size="1 1 1"/>') -> str:
+    """URDF of a base, and on it an arm; `more` is what else the robot has."""
+    base, arm = (f"<visual><geometry>{one}</geometry></visual>" for one in (shape, '<sphere radius="0.5"/>'))
+    links = f'<link name="base">{base}</link><link name="arm">{arm}</link>'
+    joint = '<joint name="j" type="revolute"><origin xyz="0 0 1"/><parent link="base"/><child link="arm"/></joint>'
+    return f'<robot name="r">{links}{joint}{"".join(more)}</robot>'
+
+
+def urdf(folder: Path, *more: str, shape: str = '<box size="1 1 1"/>') -> Path:
+    return write(folder / "a.urdf", robot(*more, shape=shape))
 
 
 # -- paths and folders ----------------------------------------------------------------------------------------
@@ -328,6 +341,32 @@ def the_same_part_twice(folder: Path) -> Path:
     return folder_of(folder, a=box(), b=box())
 
 
+@case("leave 3 edges open")
+def both_sides_of_an_open_mesh(folder: Path) -> Path:
+    vertices, faces = box()
+    return folder_of(folder, a=(vertices, np.concatenate([faces[1:], faces[1:, ::-1], faces[2:]])))
+
+
+@case("is open: 3 edges")
+def groups_of_which_one_is_open(folder: Path) -> Path:
+    vertices, faces = box(at=(3, 0, 0))
+    more = obj((vertices, faces[1:] + 8)).replace("f", "g lid\nf", 1)
+    return write(folder / "a.obj", obj(box()).replace("f", "g box\nf", 1) + more)
+
+
+@case("'a-1' and 'a-2' overlap by 0.5")
+def shells_that_overlap(folder: Path) -> Path:
+    (v, f), (w, g) = box(), box(at=(0.5, 0, 0))
+    return write(folder / "a.obj", obj((np.concatenate([v, w]), np.concatenate([f, g + 8]))))
+
+
+@case("'a-1' and 'a-2' are the same solid in the same place")
+def the_same_shell_twice(folder: Path) -> Path:
+    (v, f), (w, g) = box(), box()
+    made = trimesh.Trimesh(np.concatenate([v, w + 1e-5]), np.concatenate([f, g + 8]), process=False)
+    return write(folder / "a.stl", made.export(file_type="stl"))
+
+
 @case("3 faults in 4 parts")
 def several_faults(folder: Path) -> Path:
     vertices, faces = box(at=(9, 0, 0))
@@ -407,6 +446,12 @@ def stl_without_faces(folder: Path) -> Path:
 @case("may be cut off")
 def stl_of_text_cut_off(folder: Path) -> Path:
     return write(folder / "a.stl", "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\n").parent
+
+
+@case("may be cut off")
+def stl_of_two_solids_cut_off(folder: Path) -> Path:
+    text = trimesh.creation.box().export(file_type="stl_ascii")
+    return write(folder / "a.stl", text + "\n" + text[: text.rindex("outer")]).parent
 
 
 @case("three corners a facet")
@@ -548,6 +593,39 @@ def gltf_that_needs_an_extension(folder: Path) -> Path:
     return changed_gltf(folder, lambda tree: tree.update(extensionsRequired=["EXT_meshopt_compression"]))
 
 
+@case("glTF 2.0")
+def gltf_with_uneven_instances(folder: Path) -> Path:
+    given = {"EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": 0, "SCALE": 2}}}
+
+    def change(tree: dict[str, Any]) -> None:
+        tree["accessors"].append({**tree["accessors"][0], "count": 3})
+        tree["nodes"][0]["extensions"] = given
+
+    return changed_gltf(folder, change)
+
+
+@case("same solid in the same place")
+def gltf_with_instances_in_one_place(folder: Path) -> Path:
+    given = {"EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": 2}}}
+
+    def change(tree: dict[str, Any]) -> None:
+        tree["accessors"].append({"componentType": 5126, "count": 2, "type": "VEC3"})
+        tree["nodes"][0]["extensions"] = given
+
+    return changed_gltf(folder, change)
+
+
+@case("parts")
+def gltf_with_a_million_instances(folder: Path) -> Path:
+    given = {"EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": 2}}}
+
+    def change(tree: dict[str, Any]) -> None:
+        tree["accessors"].append({"componentType": 5126, "count": 10**6, "type": "VEC3"})
+        tree["nodes"][0]["extensions"] = given
+
+    return changed_gltf(folder, change)
+
+
 @case("index 8 vertices")
 def gltf_face_beyond(folder: Path) -> Path:
     return changed_gltf(folder, lambda tree: tree["accessors"][1].update(bufferView=0))
@@ -624,6 +702,13 @@ def item_of_no_object(folder: Path) -> Path:
     return zipped(folder, model_3mf(object_3mf(), '<item objectid="5"/>'))
 
 
+@case("at least one part")
+def supports_only(folder: Path) -> Path:
+    return zipped(
+        folder, model_3mf(object_3mf().replace("<object ", '<object type="support" '), '<item objectid="1"/>')
+    )
+
+
 @case("unit")
 def unknown_unit(folder: Path) -> Path:
     model = model_3mf(object_3mf(), '<item objectid="1"/>').replace("millimeter", "furlong")
@@ -647,6 +732,107 @@ def step_of_text(folder: Path) -> Path:
 @case("STEP")
 def step_of_noise(folder: Path) -> Path:
     return write(folder / "a.stp", np.random.default_rng(0).bytes(4000))
+
+
+@case("STEP")
+def step_cut_off(folder: Path) -> Path:
+    whole = step_bolted()
+    return write(folder / "a.step", whole[: len(whole) // 2])
+
+
+@case("STEP")
+def step_of_open_texts(folder: Path) -> Path:
+    return write(folder / "a.step", "ISO-10303-21;\n" + "#1=PRODUCT('" * 20_000 + "''" * 20_000)
+
+
+@case("STEP")
+def step_with_faces_of_an_unknown_kind(folder: Path) -> Path:
+    text = step_boxes({"a": ((0, 0, 0), (1, 1, 1))}, "in")
+    return write(folder / "a.step", text.replace("ADVANCED_FACE", "UNKNOWN_FACE"))
+
+
+# -- URDF -----------------------------------------------------------------------------------------------------
+
+
+@case("URDF")
+def urdf_of_text(folder: Path) -> Path:
+    return write(folder / "a.urdf", "no robot")
+
+
+@case("Run xacro first")
+def urdf_of_something_else(folder: Path) -> Path:
+    return write(folder / "a.urdf", '<sdf version="1.6"><model name="m"/></sdf>')
+
+
+@case("URDF")
+def urdf_with_entities(folder: Path) -> Path:
+    return write(folder / "a.urdf", '<!DOCTYPE r [<!ENTITY e SYSTEM "file:///etc/hostname">]><robot>&e;</robot>')
+
+
+@case("a tree of links")
+def urdf_with_two_bases(folder: Path) -> Path:
+    return urdf(folder, '<link name="lone"/>')
+
+
+@case("hang on no base")
+def urdf_in_a_circle(folder: Path) -> Path:
+    joints = (
+        f'<joint name="{a}{b}" type="fixed"><parent link="{a}"/><child link="{b}"/></joint>' for a, b in ("xy", "yx")
+    )
+    return urdf(folder, '<link name="x"/><link name="y"/>', *joints)
+
+
+@case("a tree of links")
+def urdf_joint_to_nowhere(folder: Path) -> Path:
+    return urdf(folder, '<joint name="k" type="fixed"><parent link="arm"/><child link="hand"/></joint>')
+
+
+@case("lies outside")
+def urdf_reaching_outside(folder: Path) -> Path:
+    write(folder / "secret.obj", obj(box()))
+    return urdf(folder / "in", shape='<mesh filename="../secret.obj"/>')
+
+
+@case("lies outside")
+def urdf_package_reaching_outside(folder: Path) -> Path:
+    write(folder / "secret.obj", obj(box()))
+    return urdf(folder / "in", shape='<mesh filename="package://in/../../secret.obj"/>')
+
+
+@case("lies outside")
+def urdf_reaching_for_a_system_file(folder: Path) -> Path:
+    return urdf(folder, shape='<mesh filename="file:///etc/hostname"/>')
+
+
+@case("can be read")
+def urdf_without_its_mesh(folder: Path) -> Path:
+    return urdf(folder, shape='<mesh filename="package://r/gone.stl"/>')
+
+
+@case("mesh format")
+def urdf_with_a_mesh_of_another_format(folder: Path) -> Path:
+    write(folder / "a.dae", "<COLLADA/>")
+    return urdf(folder, shape='<mesh filename="a.dae"/>')
+
+
+@case("'plane'")
+def urdf_with_an_unknown_shape(folder: Path) -> Path:
+    return urdf(folder, shape='<plane normal="0 0 1"/>')
+
+
+@case("no volume")
+def urdf_with_a_flat_box(folder: Path) -> Path:
+    return urdf(folder, shape='<box size="1 1 0"/>')
+
+
+@case("URDF")
+def urdf_without_a_radius(folder: Path) -> Path:
+    return urdf(folder, shape="<sphere/>")
+
+
+@case("'base' and 'arm' overlap by")
+def urdf_with_links_in_one_place(folder: Path) -> Path:
+    return write(folder / "a.urdf", robot().replace('xyz="0 0 1"', 'xyz="0 0 0.2"'))
 
 
 # -- BurrTools ------------------------------------------------------------------------------------------------

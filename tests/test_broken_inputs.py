@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from broken_inputs import CASES, PUZZLE, Case, box, glb, gltf, model_3mf, obj, object_3mf
+from broken_inputs import CASES, PUZZLE, Case, box, glb, gltf, model_3mf, obj, object_3mf, robot
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -23,7 +23,7 @@ needs_cascadio = pytest.mark.skipif(importlib.util.find_spec("cascadio") is None
 
 
 def test_the_corpus_is_large():
-    assert len(CASES) >= 100
+    assert len(CASES) >= 130
 
 
 @pytest.mark.parametrize(
@@ -75,6 +75,7 @@ def _whole_files() -> dict[str, list[bytes]]:
         ".gltf": [json.dumps(gltf()).encode()],
         ".glb": [scene.export(file_type="glb"), glb(gltf())],
         ".3mf": [packed.getvalue()],
+        ".urdf": [robot().encode()],
         ".xmpuzzle": [puzzle.encode(), gzip.compress(puzzle.encode())],
         ".json": [json.dumps(own).encode()],
     }

@@ -11,6 +11,7 @@ import networkx as nx
 import numpy as np
 import pytest
 import trimesh
+from broken_inputs import robot
 
 import neurosym as ns
 from neurosym.cli import main
@@ -328,6 +329,20 @@ def test_which_puzzle_of_a_file_and_which_of_its_solutions(capsys, tmp_path):
     assert not np.allclose(loaded.body_bounds, first.body_bounds)
     code, _, err = call(capsys, "inspect", path, "--puzzle", "3")
     assert (code, "3" in err) == (33, True)
+
+
+def test_a_robot_is_read_at_a_configuration_that_the_plan_keeps(capsys, tmp_path):
+    path = tmp_path / "arm.urdf"
+    path.write_text(robot(shape='<box size="1 1 1"/>').replace("0 0 1", "0 0 2").replace("revolute", "prismatic"))
+    code, found, _ = answer(capsys, "inspect", path)
+    assert (code, found["units"], [p["name"] for p in found["parts"]]) == (0, "m", ["base", "arm"])
+    assert [p["fixed"] for p in found["parts"]] == [True, False]
+    options = ["--joint", "j=2", "--meshes", "visual", "--no-gravity"]
+    assert answer(capsys, "plan", path, *options, "--out", tmp_path / "plan.json")[0] == 0
+    assert np.allclose(read_plan(tmp_path / "plan.json").problem.world.bounds[1], [2.5, 0.5, 2.5])
+    for wrong, said in ((["--joint", "j"], "NAME=VALUE"), (["--joint", "k=1"], "joint"), (["--meshes", "x"], "meshes")):
+        code, _, err = call(capsys, "inspect", path, *wrong)
+        assert (code, said in err) == (33, True)
 
 
 @pytest.mark.parametrize("command", ["plan", "render", "view"])

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import base64
 import gzip
-import importlib.util
 import json
+import time
 import zipfile
+from collections.abc import Callable
+from dataclasses import fields
 from pathlib import Path
+from typing import get_type_hints
 
 import numpy as np
 import pytest
@@ -15,27 +19,29 @@ from broken_inputs import PUZZLE, box, folder_of, gltf, model_3mf, obj, object_3
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
-from step_files import step_boxes
 
 import neurosym as ns
+from neurosym.commands.assemblies import FileOptions
 from neurosym.geometry.contact import collision
 from neurosym.geometry.contact.overlaps import overlaps
 from neurosym.geometry.mesh import topology, triangles
 from neurosym.geometry.mesh.broad_phase import near_pairs
 from neurosym.geometry.mesh.triangulation import triangulate
+from neurosym.geometry.notes import FaultyPartsError
 from neurosym.geometry.queries import AssemblyGeometry
 from neurosym.geometry.readers.burrtools import rotations
 from neurosym.geometry.readers.contents import RawMesh
+from neurosym.geometry.readers.mating import MAX_TOUCH
 from neurosym.geometry.readers.mesh_checks import examine
 from neurosym.geometry.readers.meshes import parts_from_meshes
 from neurosym.geometry.readers.names import distinct
+from neurosym.geometry.readers.obj import read_obj
 from neurosym.geometry.shapes import Body, Box, Convex, Part
 from neurosym.geometry.shapes import Mesh as MeshShape
 from neurosym.geometry.tolerances import Tolerances
 
 DATA = Path(__file__).parent.parent.parent / "shared" / "data"
 needs_data = pytest.mark.skipif(not DATA.is_dir(), reason="the shared data is not here")
-needs_cascadio = pytest.mark.skipif(importlib.util.find_spec("cascadio") is None, reason="cascadio is not installed")
 in_tmp_path = settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 #: Two boxes, the upper one resting on the lower; lengths such that no two are alike.
@@ -138,6 +144,36 @@ def test_a_mirrored_node_is_not_inside_out(tmp_path: Path):
     assert "inverted" not in kinds(ns.Assembly.load(path))
 
 
+def test_instances_of_a_node_are_a_part_each(tmp_path: Path):
+    def instanced(tree: dict) -> None:
+        extra = np.array([[0, 0, 0], [3, 0, 0]], "<f4").tobytes() + np.array([[1, 1, 1], [1, 2, 1]], "<f4").tobytes()
+        data = base64.b64decode(tree["buffers"][0]["uri"].partition(",")[2]) + extra
+        uri = "data:application/octet-stream;base64," + base64.b64encode(data).decode()
+        tree["buffers"][0] = {"byteLength": len(data), "uri": uri}
+        tree["bufferViews"] += [{"buffer": 0, "byteOffset": 168 + 24 * k, "byteLength": 24} for k in (0, 1)]
+        tree["accessors"] += [{"bufferView": k, "componentType": 5126, "count": 2, "type": "VEC3"} for k in (2, 3)]
+        tree["nodes"][0]["extensions"] = {"EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": 2, "SCALE": 3}}}
+        tree["extensionsUsed"] = ["EXT_mesh_gpu_instancing"]
+
+    path = write(tmp_path / "a.gltf", json.dumps(gltf(instanced)))
+    assembly = ns.Assembly.load(path, up="z")
+    assert assembly.names == ("a", "a (2)")
+    np.testing.assert_allclose(assembly.bodies.part_bounds[0], [[-0.5, -0.5, -0.5], [0.5, 0.5, 0.5]])
+    np.testing.assert_allclose(assembly.bodies.part_bounds[1], [[2.5, -1, -0.5], [3.5, 1, 0.5]])
+
+
+def test_3mf_objects_that_are_no_parts_are_named(tmp_path: Path):
+    support = object_3mf(2, box(at=(0, 0, -1))).replace("<object ", '<object type="support" ')
+    model = model_3mf(object_3mf(1) + support, '<item objectid="1"/><item objectid="2"/>')
+    with zipfile.ZipFile(tmp_path / "a.3mf", "w") as archive:
+        archive.writestr("3D/3dmodel.model", model)
+    assembly = ns.Assembly.load(tmp_path / "a.3mf")
+    assert assembly.names == ("box 1",)
+    assert [str(note) for note in assembly.notes] == [
+        "a.3mf: 1 objects that are no parts were left out: 'box 2' (support)."
+    ]
+
+
 def test_3mf_places_copies_and_states_its_unit(tmp_path: Path):
     pair = '<object id="2"><components><component objectid="1"/>'
     pair += '<component objectid="1" transform="0 1 0 -1 0 0 0 0 1 5 0 0"/></components></object>'
@@ -151,22 +187,6 @@ def test_3mf_places_copies_and_states_its_unit(tmp_path: Path):
     inches = ns.Assembly.load(tmp_path / "a.3mf", units="inches")
     np.testing.assert_allclose(inches.bounds * 25.4, assembly.bounds)
     assert inches.units == "in"
-
-
-@needs_cascadio
-def test_step_gives_a_part_for_each_product_in_metres_z_up(tmp_path: Path):
-    boxes = {"low": ((0, 0, 0), (10, 20, 30)), "high": ((0, 0, 30), (10, 20, 45))}
-    path = write(tmp_path / "a.step", step_boxes(boxes))
-    assembly = ns.Assembly.load(path)
-    assert (assembly.names, assembly.units) == (("low", "high"), "m")
-    np.testing.assert_allclose(assembly.bounds, [[0, 0, 0], [0.01, 0.02, 0.045]], atol=1e-8)
-    np.testing.assert_allclose(ns.Assembly.load(path, units="mm").bounds[1], [10, 20, 45], atol=1e-5)
-
-
-def test_step_without_cascadio_names_the_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
-    with pytest.raises(ns.MissingDependencyError, match=r"neurosym-assembly\[cad\]"):
-        ns.Assembly.load(write(tmp_path / "a.step", step_boxes({})))
 
 
 def test_the_orientations_of_burrtools_are_the_24_turns_of_a_cube():
@@ -420,6 +440,188 @@ def test_a_polygon_joined_to_its_hole_keeps_the_hole(tmp_path: Path):
     assert areas.sum() == pytest.approx(8)
     centres = vertices[cut].mean(axis=1)[areas > 1e-9]
     assert not ((centres[:, :2] > 1) & (centres[:, :2] < 2)).all(axis=1).any()
+
+
+@pytest.mark.parametrize("front", [True, False], ids=["fronts", "backs"])
+def test_polygons_are_cut_alike_from_either_side(front: bool):
+    """A face that two parts share: one has its corners the other way round, and begins elsewhere."""
+    hook = np.array([(0, 0, 0), (3, 0, 0.1), (3, 1, 0), (1, 1, -0.1), (1, 3, 0), (0, 3, 0.1)])
+    ring = np.roll(np.arange(6)[:: 1 if front else -1], 2)
+    one, other = triangulate(hook, [np.arange(6)]), triangulate(hook, [ring])
+    assert {frozenset(t) for t in one.tolist()} == {frozenset(t) for t in other.tolist()}
+    normals = [np.cross(hook[t[:, 1]] - hook[t[:, 0]], hook[t[:, 2]] - hook[t[:, 0]])[:, 2] for t in (one, other)]
+    assert (normals[0] > 0).all()
+    assert ((normals[1] > 0) == front).all()
+
+
+def test_a_polygon_of_twenty_thousand_corners_is_read_in_a_moment(tmp_path: Path):
+    n = 20_000
+    angle = 2 * np.pi * np.arange(n) / n
+    radius = 1 + 0.2 * np.sin(40 * angle)
+    flat = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1)
+    lines = [f"v {x:.9f} {y:.9f} {z}" for z in (0, 1) for x, y in flat.tolist()]
+    lines += ["f " + " ".join(map(str, range(n, 0, -1))), "f " + " ".join(map(str, range(n + 1, 2 * n + 1)))]
+    lines += [f"f {i + 1} {(i + 1) % n + 1} {n + (i + 1) % n + 1} {n + i + 1}" for i in range(n)]
+    path = write(tmp_path / "a.obj", "\n".join(lines))
+    start = time.process_time()
+    (found,) = read_obj(path).parts
+    assert time.process_time() - start < 10
+    area = (flat * np.roll(flat, -1, axis=0)[:, ::-1] * [1, -1]).sum() / 2
+    assert len(found.faces) == 2 * (n - 2) + 2 * n
+    assert volume(found.vertices, found.faces) == pytest.approx(area, rel=1e-6)
+
+
+# -- several solids -------------------------------------------------------------------------------------------
+
+
+def parted(assembly: ns.Assembly) -> dict[str, list[float]]:
+    """Where each part lies: the least and the greatest x."""
+    return {n: b[:, 0].round(6).tolist() for n, b in zip(assembly.names, assembly.bodies.part_bounds)}
+
+
+PAIR = {"left": [-0.5, 0.5], "right": [0.5, 1.5]}
+
+
+def many(*given: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """One mesh of several."""
+    starts = np.cumsum([0, *(len(v) for v, _ in given)])
+    return np.concatenate([v for v, _ in given]), np.concatenate([f + s for (_, f), s in zip(given, starts)])
+
+
+@pytest.mark.parametrize("words", [("o {}", "g faces"), ("g {}", ""), ("g {} more", "s 1")], ids=["o", "g", "g-named"])
+def test_objects_or_groups_of_an_obj_are_parts(words: tuple[str, str], tmp_path: Path):
+    text, count = "", 0
+    for name, at in (("left", 0), ("right", 1)):
+        vertices, faces = box(at=(at, 0, 0))
+        text += f"{words[0].format(name)}\n{words[1]}\n" + obj((vertices, faces + count)).split("f ", 1)[0]
+        text += "".join(f"f {a + 1} {b + 1} {c + 1}\n" for a, b, c in (faces + count).tolist())
+        count += len(vertices)
+    found = ns.Assembly.load(write(tmp_path / "a.obj", text))
+    assert {name.removesuffix(" more"): span for name, span in parted(found).items()} == PAIR
+
+
+def test_groups_that_are_faces_of_one_solid_are_one_part(tmp_path: Path):
+    text = obj(box()).replace("f ", "g top\nf ", 1)
+    where = text.rindex("f ", 0, text.rindex("f "))
+    assembly = ns.Assembly.load(write(tmp_path / "a.obj", text[:where] + "g side\n" + text[where:]))
+    assert (assembly.names, kinds(assembly)) == (("a",), ["units", "solids"])
+    assert "2 pieces of a.obj ('top', 'side')" in str(assembly.notes[1])
+
+
+def test_solids_of_a_text_stl_are_parts(tmp_path: Path):
+    text = ""
+    for name, at in (("left", 0), ("right", 1)):
+        one = mesh(box(at=(at, 0, 0))).export(file_type="stl_ascii")
+        text += f"solid {name}\n" + one.split("\n", 1)[1].rsplit("endsolid", 1)[0] + f"endsolid {name}\n"
+    assert parted(ns.Assembly.load(write(tmp_path / "a.stl", text))) == PAIR
+    # In a folder a file is a part: both are one, and as they touch all over a face, one solid.
+    assert parted(ns.Assembly.load(tmp_path)) == {"a": [-0.5, 1.5]}
+
+
+@pytest.mark.parametrize("ending", ["stl", "ply", "off", "glb"])
+def test_closed_shells_of_one_mesh_are_parts_and_a_shell_inside_is_a_cavity(ending: str, tmp_path: Path):
+    hollow = box((4, 4, 4))[0], np.concatenate([box()[1]])
+    cave = box((3, 3, 3))[0], box()[1][:, ::-1]
+    stone = box((1, 1, 1), at=(0, 0, -1))
+    slab = box((4, 4, 1), at=(0, 0, -2.5))  # touches the hollow one all over a face
+    apart = box((1, 1, 1), at=(7, 0, 0))
+    mesh(many(hollow, cave, stone, slab, apart)).export(tmp_path / f"a.{ending}")
+    found = ns.Assembly.load(tmp_path / f"a.{ending}", units="m")
+    name = found.names[0].removesuffix("-1")
+    assert found.names == tuple(f"{name}-{k}" for k in (1, 2, 3, 4))
+    volumes = [volume(v, f) for v, f in (body_mesh(found, i) for i in range(4))]
+    np.testing.assert_allclose(volumes, [64 - 27, 1, 16, 1], rtol=1e-6)
+    (note,) = [n for n in found.notes if n.kind == "solids"]
+    assert (note.measure, f"'{name}-1' to '{name}-4'" in note.sentence) == (4, True)
+
+
+def body_mesh(assembly: ns.Assembly, part: int) -> tuple[np.ndarray, np.ndarray]:
+    return many(*((assembly.bodies.vertices(int(i)), assembly.bodies[int(i)].shape.faces)
+                  for i in np.flatnonzero(assembly.owners == part)))  # fmt: skip
+
+
+def test_solids_side_by_side_in_one_file_of_a_folder_are_noted(tmp_path: Path):
+    folder_of(tmp_path, a=many(box(), box(at=(3, 0, 0))), b=box(at=(0, 0, 1)))
+    assembly = ns.Assembly.load(tmp_path, units="mm")
+    (note,) = [n for n in assembly.notes if n.kind == "solids"]
+    assert (assembly.names, note.part, note.measure) == (("a", "b"), "a", 2)
+
+
+# -- the same from memory -------------------------------------------------------------------------------------
+
+
+def test_a_mesh_with_each_face_on_both_sides_is_one_solid(tmp_path: Path):
+    vertices, faces = box((1, 2, 3))
+    once_more = np.stack([faces, faces[:, ::-1]], axis=1).reshape(-1, 3)
+    for both in (np.concatenate([faces, faces[:, ::-1]]), once_more, once_more[1:]):
+        found = examine(raw(vertices, both))
+        assert ([n.kind for n in found.notes], found.faults) == (["doubled"], ())
+        assert volume(found.vertices, found.faces) == pytest.approx(6)
+    assembly = ns.Assembly.load(write(tmp_path / "a.obj", obj((vertices, once_more))), units="m")
+    assert (assembly.names, kinds(assembly)) == (("a",), ["doubled"])
+    # A sheet with two sides is none.
+    assert [n.kind for n in examine(raw(vertices, once_more[:4])).faults] == ["flat"]
+
+
+MESHES = {
+    "sound": box(),
+    "twice": (box()[0], np.concatenate([box()[1], box()[1][:1]])),
+    "inside out": (box()[0], box()[1][:, ::-1]),
+    "both sides": (box()[0], np.concatenate([box()[1], box()[1][:, ::-1]])),
+    "open": (box()[0], box()[1][1:]),
+    "flat": (box()[0] * [1, 1, 0], box()[1]),
+    "nan": (box()[0] * [1, 1, np.nan], box()[1]),
+}
+
+
+@pytest.mark.parametrize("given", MESHES)
+def test_a_mesh_in_memory_is_treated_as_one_in_a_file(given: str, tmp_path: Path):
+    def outcome(make: Callable[[], ns.Assembly]) -> list[str]:
+        try:
+            return [note.kind for note in make().notes]
+        except FaultyPartsError as error:
+            return [f"fault {note.kind}" for note in error.notes]
+
+    folder = folder_of(tmp_path, a=MESHES[given], b=box(at=(0, 0, 1)))
+    meshes = {"a": MESHES[given], "b": box(at=(0, 0, 1))}
+    read = outcome(lambda: ns.Assembly.load(folder, units="m"))
+    assert outcome(lambda: ns.Assembly.from_meshes(meshes, units="m")) == read
+    assert (read == []) == (given == "sound")
+
+
+@in_tmp_path
+@given(depth=st.floats(0, 0.2))
+def test_what_is_accepted_in_memory_is_accepted_from_its_file(depth: float, tmp_path: Path):
+    plates = {"low": box((4, 4, 1)), "high": box((4, 4, 1), at=(0, 0, 1 - depth))}
+    for tolerances in (None, Tolerances(), Tolerances(touch=0.1)):
+        if depth > max(0.075, 0 if tolerances is None else tolerances.touch):
+            with pytest.raises(FaultyPartsError, match="overlap by"):
+                ns.Assembly.from_meshes(plates, tolerances=tolerances)
+            continue
+        assembly = ns.Assembly.from_meshes(plates, units="mm", fixed=["low"], tolerances=tolerances)
+        assert (assembly.units, assembly.fixed) == ("mm", ("low",))
+        assembly.save(tmp_path / "a.json")
+        assert same(ns.Assembly.load(tmp_path / "a.json"), assembly)
+
+
+def test_no_advice_goes_beyond_what_the_option_takes(tmp_path: Path):
+    option = next(f for f in fields(FileOptions) if f.name == "touch")
+    (typed,) = get_type_hints(FileOptions, include_extras=True)[option.name].__metadata__
+    assert typed.max == MAX_TOUCH
+    for depth, advised in ((0.2, True), (0.9, False)):
+        with pytest.raises(FaultyPartsError) as caught:
+            ns.Assembly.from_meshes({"a": box((2, 2, 1)), "b": box((2, 2, 1), at=(0.5, 0, 1 - depth))})
+        assert ("--touch" in str(caught.value)) == advised
+    for gap, advised in ((0.2, True), (0.9, False)):
+        (note,) = ns.Assembly.from_meshes({"a": box(), "b": box(at=(0, 0, 1 + gap))}).notes
+        assert ("--touch" in note.remedy) == advised
+
+
+def test_progress_is_told_part_by_part(tmp_path: Path):
+    told: list[tuple[int, int]] = []
+    folder_of(tmp_path, a=box(), b=box(at=(0, 0, 1)))
+    ns.Assembly.load(tmp_path, progress=lambda done, total: told.append((done, total)))
+    assert told == [(0, 3), (1, 3), (3, 3)]
 
 
 # -- overlaps at rest -----------------------------------------------------------------------------------------

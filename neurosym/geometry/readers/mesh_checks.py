@@ -135,14 +135,16 @@ def _closed(vertices: Array, faces: Numbers, found: _Findings) -> tuple[Array, N
     if len(half) or not len(faces):
         once = topology.without_repeats(merged, cancel=False)
         turned = topology.same_winding(once) if len(once) > len(faces) else None
-        if turned is not None and not len(topology.open_edges(turned)[0]):
+        left = 0 if turned is None else len(topology.open_edges(turned)[0])
+        if turned is not None and not left:
             found.note("doubled", len(once), "had faces twice, wound both ways, as if hollow; each was taken once")
-            return vertices, turned
+            return vertices, turned if topology.signed_volume(vertices, turned) > 0 else turned[:, ::-1]
+        if not len(faces):
+            said = f"its faces cancel, and taken once leave {left} edges open" if left else "its faces are lines"
+            found.fault("flat", left, f"encloses nothing: {said}", "Give it a thickness, or close it.")
+            return vertices, faces
     elif len(vertices) < len(exact) and len(topology.open_edges(topology.without_repeats(joined))[0]):
         found.note("merged", len(exact) - len(vertices), f"has corners up to {MERGE * extent:.2g} apart made one")
-    if not len(faces):
-        found.fault("flat", 0, "encloses nothing: its faces cancel or are lines", "Give it a thickness.")
-        return vertices, faces
     if len(faces) < given:
         dropped = given - len(faces)
         said = f"had {dropped} faces of no area, given twice or back to back, which were dropped"
