@@ -21,7 +21,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 import neurosym as ns
-from neurosym.commands.assemblies import FileOptions
+from neurosym.commands.common import FileOptions
 from neurosym.geometry.contact import collision
 from neurosym.geometry.contact.overlaps import overlaps
 from neurosym.geometry.mesh import topology, triangles

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from neurosym.geometry.mesh import topology, triangles
+from neurosym.geometry.mesh.broad_phase import CHUNK, near_pairs
 from neurosym.geometry.notes import Note
 from neurosym.geometry.readers.contents import Contents, RawMesh, united
 from neurosym.geometry.readers.mesh_checks import FLAT, LARGEST, MERGE
@@ -83,7 +84,7 @@ def separated(mesh: RawMesh) -> list[RawMesh]:
 def _solids(shells: list[Array], volumes: Array) -> Numbers:
     """int64 (k,): for each shell, (m, 3, 3) outward, the number of the one that it is a cavity of, else its own."""
     low, high = (np.array([f(t.reshape(-1, 3), axis=0) for t in shells]) for f in (np.min, np.max))
-    pairs = triangles.near_pairs((low, high), (low, high), 20 * triangles.CHUNK)
+    pairs = near_pairs((low, high), (low, high), 20 * CHUNK)
     around: list[list[int]] = [[] for _ in shells]
     for i, j in [] if pairs is None else pairs:
         within = (low[j] <= low[i]).all() and (high[i] <= high[j]).all() and volumes[i] < volumes[j]
