@@ -1,20 +1,26 @@
-"""Ways out where no straight line is free: exact moves for puzzles of cells, searches with a budget for the rest."""
+"""Paths where no straight line is free: exact moves for puzzles of cells, else searches; and a check of any motion."""
 
 from __future__ import annotations
 
 import zlib
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.paths.grid import GridCells
+from neurosym.geometry.paths.path_check import check_path
 from neurosym.geometry.paths.voxel_search import first_separation
 from neurosym.geometry.paths.voxel_separation import Separation, Stuck, separation_path
 from neurosym.geometry.queries import AssemblyGeometry
-from neurosym.geometry.step_motion import StepMotion
+from neurosym.geometry.step_motion import GROUND, StepMotion
+from neurosym.language.search_problem import Verdict
 from neurosym.support.bitsets import bits
 from neurosym.support.words import listed
+
+if TYPE_CHECKING:
+    from domains.assembly import Setting
 
 #: Poses and ways that each kind of search may ask for one way out (`geometry.paths.path_search`): seconds, mostly.
 MAX_CHECKS = 100_000
@@ -100,3 +106,30 @@ def _way(cells: GridCells, found: Separation | Stuck) -> StepMotion | NoWay:
     names = tuple(cells.names[p] for p in bits(found.block))
     said = f"No moves of groups separate what is wanted of {listed(names)}, in {found.explored:,} states."
     return NoWay(said, names, found.proved)
+
+
+def check_motion(
+    geometry: AssemblyGeometry, setting: Setting, motion: StepMotion, among: int, *, standing: bool
+) -> Verdict:
+    """Whether parts may leave the others in `among` by a motion that a plan says, asked of the pairs concerned alone.
+
+    Args:
+        standing: whether all that stands on the ground; otherwise it is in the hand.
+    """
+    assembly, said = geometry.assembly, ", ".join(motion.parts)
+    if motion.direction is None:
+        if setting.paths == "straight" or not motion.tracks:
+            return Verdict(False, motion.parts, f"{said} cannot go {motion}: that is no straight line.")
+        clear = check_path(motion, assembly, among, ground=ground_of(assembly) if standing else None)
+        return Verdict(clear.holds, clear.parts, clear.reason, motion=motion)
+    direction, leaving = np.array(motion.direction), assembly.mask(motion.parts)
+    if min(np.abs(direction - d).max() for d in geometry.blocking(setting.directions).vectors) > 1e-9:
+        return Verdict(False, motion.parts, f"{said} cannot go {motion}: that is none of the problem's directions.")
+    hit = 0
+    for part in bits(leaving):
+        hit |= geometry.hits_along(part, direction, among & ~leaving)
+    into_table = standing and assembly.has_table and direction[2] < -assembly.tolerances.parallel
+    names = (*assembly.in_mask(hit), *([GROUND] if into_table else []))
+    if names:
+        return Verdict(False, assembly.in_mask(hit), f"{said} cannot go {motion}: {listed(names)} would be hit.")
+    return Verdict(True, motion=motion)

@@ -6,13 +6,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from domains.assembly_paths import NoWay, ground_of, way_out
+from domains.assembly_paths import NoWay, check_motion, way_out
 from domains.assembly_why import explain_removal, refute_removal
-from neurosym.geometry.paths.path_check import check_path
 from neurosym.geometry.queries import AssemblyGeometry
-from neurosym.geometry.step_motion import GROUND, StepMotion
+from neurosym.geometry.step_motion import StepMotion
 from neurosym.language import Action, Derived, Domain, Fluent, Problem, Simulation, State, Type, formulas, predicates
 from neurosym.language.explanation import WhyNot
 from neurosym.language.search_problem import Verdict
@@ -96,21 +93,7 @@ def can_leave(setting: Setting) -> Derived:
     def check(world: AssemblyGeometry, state: State, motion: StepMotion, p: str) -> Verdict:
         if motion.parts != (p,) or not (motion.direction or motion.tracks):
             return ask(world, state, p)
-        there = state.mask(present, world.names)
-        if motion.direction is None:
-            if setting.paths == "straight":
-                return Verdict(False, (p,), f"{p} cannot go {motion}: that is no straight line.")
-            clear = check_path(motion, world.assembly, there, ground=ground_of(world.assembly))
-            return Verdict(clear.holds, clear.parts, clear.reason or f"{p} is free {motion}.", motion=motion)
-        direction = np.array(motion.direction)
-        if min(np.abs(direction - d).max() for d in world.blocking(setting.directions).vectors) > 1e-9:
-            return Verdict(False, (p,), f"{p} cannot go {motion}: that is none of the problem's directions.")
-        names = world.in_mask(world.hits_along(world.index[p], direction, there & ~(1 << world.index[p])))
-        if world.assembly.has_table and direction[2] < -world.assembly.tolerances.parallel:
-            names = (*names, GROUND)
-        if names:
-            return Verdict(False, tuple(n for n in names if n != GROUND), f"{p} cannot go {motion}: {listed(names)}.")
-        return Verdict(True, (), f"{p} is free {motion}.", motion=motion)
+        return check_motion(world, setting, motion, state.mask(present, world.names), standing=True)
 
     return Derived("free", [part], ask, check=check, formula=straight.formula if setting.paths == "straight" else None)
 

@@ -15,13 +15,11 @@ import heapq
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from domains.assembly_paths import NoWay, ground_of, separation, way_out
-from neurosym.geometry.paths.path_check import check_path
+from domains.assembly_paths import NoWay, check_motion, separation, way_out
 from neurosym.geometry.queries import AssemblyGeometry
 from neurosym.geometry.step_motion import StepMotion
 from neurosym.language.predicates import stands
 from neurosym.language.search_problem import Verdict
-from neurosym.support.bitsets import bits
 from neurosym.support.words import listed
 
 if TYPE_CHECKING:
@@ -103,21 +101,9 @@ class Splitter:
             return Verdict(False, motion.parts, f"{said}: this does not split {name} from its block.")
         if block.stands and leaving & self.assembly.fixed_mask:
             return Verdict(False, motion.parts, f"{said}: one of these is fixed.")
-        if motion.tracks and motion.direction is None:
-            if self.setting.paths != "any":
-                return Verdict(False, motion.parts, f"{said}: the path is not one of theirs.")
-            ground = ground_of(self.assembly) if block.stands else None
-            clear = check_path(motion, self.assembly, block.parts, ground=ground)
-            if not clear.holds:
-                return Verdict(False, clear.parts, clear.reason)
-        else:
-            d = self._number(motion)
-            if d < 0 or (block.stands and self.graph.into_table[d]):
-                return Verdict(False, (), f"{said} cannot go {motion}: that is none of the problem's ways out.")
-            for mine in bits(leaving):
-                hit = self.assembly.in_mask(self.graph.blockers(mine, d, rest))
-                if hit:
-                    return Verdict(False, hit, f"{said} cannot go {motion}: {listed(hit)} would be hit.")
+        free = check_motion(self.geometry, self.setting, motion, block.parts, standing=block.stands)
+        if not free.holds:
+            return free
         if block.stands and self.setting.gravity:
             if len(motion.held) > self.setting.held or self.assembly.mask(motion.held) & ~rest:
                 return Verdict(False, motion.held, f"{', '.join(motion.held)} cannot all be held.")
@@ -150,12 +136,6 @@ class Splitter:
             return Verdict(True)
         names = self.assembly.in_mask(leaving)
         return stands(self.geometry, block.parts & ~leaving, names, held=self.setting.held)
-
-    def _number(self, motion: StepMotion) -> int:
-        for d, vector in enumerate(self.graph.vectors):
-            if motion.direction is not None and max(abs(a - b) for a, b in zip(vector, motion.direction)) < 1e-9:
-                return d
-        return -1
 
     def _interlocked(self, block: Block, part: int, anchor: int) -> Verdict:
         name, kept = self.assembly.names[part], self.assembly.in_mask(anchor)
