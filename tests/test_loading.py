@@ -24,6 +24,7 @@ import neurosym as ns
 from neurosym.commands.common import FileOptions
 from neurosym.geometry.contact import collision
 from neurosym.geometry.contact.overlaps import overlaps
+from neurosym.geometry.contact.surfaces import BodySurfaces
 from neurosym.geometry.mesh import topology, triangles
 from neurosym.geometry.mesh.broad_phase import near_pairs
 from neurosym.geometry.mesh.triangulation import triangulate
@@ -289,7 +290,7 @@ def test_mating_blocks_that_overlap_slightly_are_taken_for_touching():
     assembly = ns.Assembly.load(DATA / "crossvault")
     (note,) = [n for n in assembly.notes if n.kind == "mating"]
     assert assembly.touch > note.measure > 1e-3 * assembly.smallest_extent
-    assert max(o.depth for o in overlaps(assembly.bodies)) == pytest.approx(note.measure)
+    assert max(o.depth for o in overlaps(BodySurfaces(assembly.bodies))) == pytest.approx(note.measure)
 
 
 # -- names and units ------------------------------------------------------------------------------------------
@@ -654,7 +655,7 @@ def test_a_layer_that_two_prisms_both_claim_is_as_deep_as_it_is(sides, depth, sh
     low, high = prism(sides[0], 1.0, 1.0), prism(sides[1], 0.9, 1.3)
     high = turned(high, Rotation.from_euler("z", spin).as_matrix(), (*shift, 1.15 - depth))
     R = Rotation.random(random_state=seed).as_matrix()
-    (found,) = overlaps(assembled(turned(low, R), turned(high, R)).bodies)
+    (found,) = overlaps(BodySurfaces(assembled(turned(low, R), turned(high, R)).bodies))
     assert found.depth == pytest.approx(depth, rel=1e-6)
 
 
@@ -668,7 +669,7 @@ def test_boxes_overlap_by_no_more_than_the_shortest_way_apart_and_never_by_nothi
     first, second = np.array(sizes[:3]), np.array(sizes[3:])
     apart = (first + second) / 2 - np.abs(shift)
     R = Rotation.random(random_state=seed).as_matrix()
-    found = overlaps(assembled(turned(box(first), R), turned(box(second, at=shift), R)).bodies)
+    found = overlaps(BodySurfaces(assembled(turned(box(first), R), turned(box(second, at=shift), R)).bodies))
     if apart.min() < 1e-3:
         assert all(o.depth <= max(apart.min(), 0) + 1e-9 for o in found)
     else:
@@ -686,7 +687,7 @@ def test_a_peg_in_its_hole_only_touches(sides: int, slack: float, lift: float, s
     R = Rotation.random(random_state=seed).as_matrix()
     peg = prism(sides, 0.5 - slack, 3.0)
     hole = (np.array(ring.vertices), np.array(ring.faces))
-    assert not overlaps(assembled(turned(hole, R), turned(peg, R, R @ [0, 0, lift])).bodies)
+    assert not overlaps(BodySurfaces(assembled(turned(hole, R), turned(peg, R, R @ [0, 0, lift])).bodies))
 
 
 @settings(deadline=None, max_examples=15)
@@ -694,13 +695,13 @@ def test_a_peg_in_its_hole_only_touches(sides: int, slack: float, lift: float, s
 def test_a_peg_too_wide_for_its_hole_overlaps_by_the_difference(sides: int, tight: float):
     ring = trimesh.creation.annulus(0.5, 1.0, 1.0, sections=sides)
     pair = assembled((np.array(ring.vertices), np.array(ring.faces)), prism(sides, 0.5 + tight, 3.0))
-    (found,) = overlaps(pair.bodies)
+    (found,) = overlaps(BodySurfaces(pair.bodies))
     flats = tight * np.cos(np.pi / sides)
     assert flats * (1 - 1e-6) <= found.depth <= tight * 1.45
 
 
 def test_two_copies_in_one_place_overlap_by_their_thickness():
-    (found,) = overlaps(assembled(box((1, 2.03, 3.1)), box((1, 2.03, 3.1))).bodies)
+    (found,) = overlaps(BodySurfaces(assembled(box((1, 2.03, 3.1)), box((1, 2.03, 3.1))).bodies))
     assert found.depth == pytest.approx(1)
 
 

@@ -5,11 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import ConvexHull
 
 from neurosym.geometry.assembly import Assembly
-from neurosym.geometry.contact.surfaces import Surfaces, facet_distances
+from neurosym.geometry.contact.surfaces import Surfaces
 from neurosym.geometry.mesh.broad_phase import overlapping_pairs
 from neurosym.support.arrays import Array, Numbers
+from neurosym.support.compiled import compiled
 
 #: Share of the smallest extent that counts as an overlap at rest, however coarse `touch` is: along an oblique joint a
 #: layer thinner than `touch` may yet be deeper and wider than it.
@@ -45,18 +47,63 @@ class MatingOverlaps:
         return apart
 
 
-def mating_overlaps(assembly: Assembly, hulls: Surfaces) -> MatingOverlaps:
+def mating_overlaps(assembly: Assembly, surfaces: Surfaces) -> MatingOverlaps:
     """The facet of either hull that is overlapped least shows the shortest way apart (up to edges against edges)."""
     bounds, half = assembly.body_bounds, min(assembly.touch, OVERLAP * assembly.smallest_extent) / 2
     near = overlapping_pairs(bounds[:, 0] + half, bounds[:, 1] - half, assembly.owners)
-    depth = np.full(len(near), np.inf)
-    ways = np.zeros((len(near), 3))
-    for pairs, sign in ((near, 1.0), (near[:, ::-1], -1.0)):
-        for pair, facet, distance in facet_distances(hulls, pairs):
-            order = np.lexsort((distance, pair))[::-1]  # of each pair the least overlapped facet first
-            first = order[np.flatnonzero(np.diff(pair[order], prepend=-1))]
-            better = first[-distance[first] < depth[pair[first]]]
-            depth[pair[better]] = -distance[better]
-            ways[pair[better]] = sign * hulls.normals[facet[better]]
+    count = len(assembly.bodies)
+    bodies, place = np.unique(near, return_inverse=True)
+    hulls = [_hull(assembly, surfaces, int(b)) for b in bodies]
+    planes, corners = (np.concatenate([np.zeros((0, k)), *(h[i] for h in hulls)]) for i, k in ((0, 4), (1, 3)))
+    first = [np.concatenate([[0], np.cumsum([len(h[i]) for h in hulls], dtype=np.int64)]) for i in (0, 1)]
+    pairs = place.reshape(-1, 2).astype(np.int64)
+    depth, normals = _least_overlaps(planes, first[0], corners, first[1], pairs, assembly.mate)
     kept = (depth > 2 * half) & (depth <= assembly.mate)
-    return MatingOverlaps(near[kept], depth[kept, None] * ways[kept], len(assembly.bodies))
+    return MatingOverlaps(near[kept], depth[kept, None] * normals[kept], count)
+
+
+def _hull(assembly: Assembly, surfaces: Surfaces, body: int) -> tuple[Array, Array]:
+    """Planes of the facets of a body's convex hull, float64 (m, 4): n . x + w <= 0 inside; and its corners, (k, 3)."""
+    vertices = surfaces.vertices[surfaces.first_vertex[body] : surfaces.first_vertex[body + 1]]
+    if not assembly.bodies.is_convex[body]:
+        hull = ConvexHull(vertices)
+        return hull.equations, vertices[hull.vertices]
+    own = slice(surfaces.first[body], surfaces.first[body + 1])
+    offsets = np.einsum("md,md->m", surfaces.normals[own], surfaces.middles[own])
+    return np.column_stack([surfaces.normals[own], -offsets]), vertices
+
+
+@compiled
+def _least_overlaps(
+    planes: Array, first: Numbers, corners: Array, first_corner: Numbers, pairs: Numbers, limit: float
+) -> tuple[Array, Array]:
+    """How far, and which way, the second of two convex bodies has to move off the first: (k,), (k, 3), of pairs (k, 2).
+
+    Args:
+        planes: float64 (m, 4): n . x + w <= 0 inside, body by body.
+        limit: depths beyond are given as infinite.
+    """
+    depth, direction = np.full(len(pairs), np.inf), np.zeros((len(pairs), 3))
+    for k in range(len(pairs)):
+        best = -limit * (1 + 1e-12)
+        for side in range(2):
+            a, b = pairs[k, side], pairs[k, 1 - side]
+            last = first_corner[b]
+            for f in range(first[a], first[a + 1]):
+                x, y, z, w = planes[f]
+                # A corner that lies deep under one facet does under most: it is asked first.
+                least = x * corners[last, 0] + y * corners[last, 1] + z * corners[last, 2] + w
+                if least <= best:
+                    continue
+                for c in range(first_corner[b], first_corner[b + 1]):
+                    height = x * corners[c, 0] + y * corners[c, 1] + z * corners[c, 2] + w
+                    if height < least:
+                        least, last = height, c
+                        if least <= best:
+                            break
+                if least > best:
+                    best = least
+                    depth[k] = -least
+                    for axis in range(3):
+                        direction[k, axis] = planes[f, axis] * (1 - 2 * side)
+    return depth, direction

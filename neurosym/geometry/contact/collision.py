@@ -9,7 +9,6 @@ from __future__ import annotations
 import fcl
 import numpy as np
 
-from neurosym.geometry.bodies import Bodies
 from neurosym.geometry.shapes import Box, Shape
 from neurosym.support.arrays import Array
 
@@ -64,21 +63,3 @@ def box_patch(a: fcl.CollisionObject, b: fcl.CollisionObject) -> tuple[Array, Ar
     if np.dot(normal, np.asarray(b.getTranslation()) - np.asarray(a.getTranslation())) < 0:
         normal = -normal
     return points, normal
-
-
-class Gaps:
-    """How far apart the surfaces of bodies are; each body is handed to FCL once."""
-
-    def __init__(self, bodies: Bodies) -> None:
-        self.bodies = bodies
-        self._objects: dict[int, fcl.CollisionObject] = {}
-
-    def between(self, a: int, b: int) -> float:
-        """Least distance (length) of bodies `a` and `b`; 0 where they overlap."""
-        first, second = self._object(a), self._object(b)
-        return 0.0 if collide(first, second) else max(distance(first, second), 0.0)
-
-    def _object(self, body: int) -> fcl.CollisionObject:
-        if body not in self._objects:
-            self._objects[body] = shape_object(self.bodies[body].shape, self.bodies.X_WB[body])
-        return self._objects[body]

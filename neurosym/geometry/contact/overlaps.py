@@ -11,36 +11,35 @@ never too large for others.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from functools import cached_property
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from neurosym.geometry.bodies import Bodies
-from neurosym.geometry.mesh import triangles
-from neurosym.geometry.mesh.broad_phase import CHUNK, near_pairs, overlapping_pairs
-from neurosym.support.arrays import Array, Numbers
+from neurosym.geometry.contact.surfaces import BodySurfaces
+from neurosym.geometry.mesh import kernels
+from neurosym.geometry.mesh.broad_phase import overlapping_pairs, spans
+from neurosym.geometry.mesh.distances import are_inside, nearest
+from neurosym.geometry.mesh.triangles import pierced, plane_axes
+from neurosym.support.arrays import Array, Numbers, Truths
+
+#: Points (n, 3), and the pair of bodies that each is meant for, int64 (n,).
+Points = tuple[Array, Numbers]
 
 #: Overlaps below this share of the smallest extent are rounding.
 NOISE = 1e-6
 
-#: Normals of one body along which a gap is looked for; a body with more is asked about these many.
-MAX_NORMALS = 256
-
-#: For one pair of bodies, pairs of faces clipped, points asked whether they lie inside, and points measured that do:
-#: evenly spread ones where there are more.
-MAX_PATCHES, MAX_ASKED, MAX_MEASURED = 4_000, 4_000, 256
-
-#: Places where edges go through faces that are joined two by two.
-MAX_PLACES = 40
+#: For one pair of bodies, evenly spread ones where there are more: points asked whether they lie inside, and points
+#: measured that do; places where edges go through faces that are joined two by two.
+MAX_ASKED, MAX_MEASURED, MAX_PLACES = 4_000, 256, 40
 
 #: Bodies with more pairs of faces than this are searched for overlaps up to `FAR` of the smallest extent only; deeper
 #: ones show by points that far under their faces.
 DENSE, FAR = 100_000, 0.1
 
-#: Faces look at one another when the cosine between their normals is below this.
-_FACING = -0.1
+#: So many pairs of faces are compared at a time.
+_AT_A_TIME = 1_000_000
 
 
 @dataclass(frozen=True)
@@ -52,176 +51,169 @@ class Overlap:
     depth: float
 
 
-def overlaps(bodies: Bodies, fixed: int = 0) -> list[Overlap]:
+def overlaps(surfaces: BodySurfaces, fixed: int = 0) -> list[Overlap]:
     """All overlaps of bodies of different parts, those between two parts of the bitset `fixed` left out."""
-    noise = NOISE * bodies.smallest_extent
+    bodies = surfaces.bodies
+    noise, far = NOISE * bodies.smallest_extent, FAR * bodies.smallest_extent
     low, high = bodies.bounds[:, 0], bodies.bounds[:, 1]
-    inner = (np.minimum(low + noise / 2, high), np.maximum(high - noise / 2, low))
+    pairs = overlapping_pairs(np.minimum(low + noise / 2, high), np.maximum(high - noise / 2, low), bodies.owners)
     rests = np.array([fixed >> o & 1 for o in bodies.owners.tolist()], dtype=bool)
-    pairs = overlapping_pairs(*inner, bodies.owners)
     pairs = pairs[~rests[pairs].all(axis=1)]
-    surfaces = {int(i): _Body.of(bodies, int(i)) for i in np.unique(pairs)}
-    deep = []
-    for i, j in pairs:
-        a, b = surfaces[int(i)], surfaces[int(j)]
-        reach = _least_width(a, b)
-        if reach > noise:
-            depth = min(_depth(a, b, noise, FAR * bodies.smallest_extent), reach)
-            if depth > noise:
-                deep.append(Overlap(int(i), int(j), depth))
-    return deep
+    if not len(pairs):
+        return []
+    whole = float(np.ptp(bodies.bounds, axis=(0, 1)).sum())
+    first = _Pairs(surfaces, pairs, noise)
+    # Only of bodies that overlap in some point faces are compared.
+    pairs = pairs[first.overlapping()]
+    count = np.diff(surfaces.exact.first)[pairs].prod(axis=1)
+    depths = [np.zeros(0)]
+    for rows in np.split(np.arange(len(pairs)), np.flatnonzero(np.diff(np.cumsum(count) // _AT_A_TIME)) + 1):
+        if len(rows):
+            some = _Pairs(surfaces, pairs[rows], noise)
+            depths.append(some.depths(np.where(count[rows] <= DENSE, whole, far)))
+    deep = zip(pairs.tolist(), np.concatenate(depths).tolist())
+    return [Overlap(a, b, depth) for (a, b), depth in deep if depth > noise]
 
 
-@dataclass(frozen=True, eq=False)
-class _Body:
-    """``vertices`` (n, 3) and ``triangles`` (m, 3, 3) of a body in the world; ``normals``: unit (m, 3), outward."""
+class _Pairs:
+    """Pairs of bodies, int64 (k, 2)."""
 
-    vertices: Array
-    triangles: Array
-    normals: Array
+    def __init__(self, surfaces: BodySurfaces, pairs: Numbers, noise: float) -> None:
+        self.surfaces, self.exact, self.flats = surfaces, surfaces.exact, surfaces.flats(noise / 2)
+        self.pairs, self.noise = pairs, noise
+        bounds = surfaces.bodies.bounds[pairs]
+        self.low, self.high = bounds[:, :, 0].max(axis=1), bounds[:, :, 1].min(axis=1)
 
-    @classmethod
-    def of(cls, bodies: Bodies, body: int) -> _Body:
-        vertices = bodies.vertices(body)
-        t = vertices[bodies[body].shape.faces]
-        cross = triangles.area_vectors(t)
-        size = np.linalg.norm(cross, axis=1)
-        kept = size > 1e-12 * np.ptp(vertices) ** 2
-        return cls(vertices, t[kept], cross[kept] / size[kept, None])
+    def overlapping(self) -> Truths:
+        """Whether a corner, the middle of an edge or a point just under a face lies within the other body, or an edge
+        goes through a face."""
+        s = self.exact
+        under = s.middles - 2 * self.noise * s.normals
+        edges = [(s.triangles[:, k] + s.triangles[:, (k + 1) % 3]) / 2 for k in range(3)]
+        overlap = np.zeros(len(self.pairs), dtype=bool)
+        overlap[self.places[1]] = True
+        probes = [(s.vertices, s.first_vertex), (under, s.first), *((e, s.first) for e in edges)]
+        for points, first in probes:
+            overlap[self._in_other(points, first, ~overlap)[1]] = True
+        return overlap
 
-    def directions(self) -> Array:
-        """Unit normals (k, 3), each direction once, no more than `MAX_NORMALS`."""
-        rounded = np.round(self.normals, 6)
-        return _some(np.unique(rounded, axis=0), MAX_NORMALS)
+    def depths(self, gaps: Array) -> Array:
+        """How deep the bodies overlap, float64 (k,); faces are compared up to a distance of `gaps` (k,)."""
+        s, depth = self.exact, np.zeros(len(self.pairs))
+        corners, pair, other = self._in_other(s.vertices, s.first_vertex)
+        corners, pair, other = (x[_spread(pair, MAX_MEASURED)] for x in (corners, pair, other))
+        away = nearest(corners, other, s.triangles, *s.trees, s.first)
+        np.maximum.at(depth, pair, np.where(away > self.noise, away, 0.0))
+        dense = gaps == gaps.min()
+        under = s.middles - gaps.min() / 2 * s.normals
+        middles = [self._between(gaps), self._amid(), self._in_other(under, s.first, dense)[:2]]
+        points, pair = (np.concatenate(x) for x in zip(*middles))
+        kept = _spread(pair, MAX_ASKED)
+        points, pair = points[kept], pair[kept]
+        for side in (0, 1):
+            inside = are_inside(points, self.pairs[pair, side], s.triangles, *s.trees, s.first)
+            points, pair = points[inside], pair[inside]
+        kept = _spread(pair, MAX_MEASURED)
+        points, pair = points[kept], pair[kept]
+        away = np.min([nearest(points, self.pairs[pair, n], s.triangles, *s.trees, s.first) for n in (0, 1)], axis=0)
+        np.maximum.at(depth, pair, np.where(away > self.noise / 2, 2 * away, 0.0))
+        return depth
 
+    def _in_other(self, points: Array, first: Numbers, asked: Truths | None = None) -> tuple[Array, Numbers, Numbers]:
+        """Points of either body, body b's from first[b] on, that lie within the other: points, pair, other body."""
+        rows = np.arange(len(self.pairs)) if asked is None else np.flatnonzero(asked)
+        pair = np.concatenate([rows, rows])
+        own, other = self.pairs[rows].T.ravel(), self.pairs[rows, ::-1].T.ravel()
+        run, place = spans(np.diff(first)[own])
+        at, pair, other = first[own[run]] + place, pair[run], other[run]
+        near = ((points[at] >= self.low[pair]) & (points[at] <= self.high[pair])).all(axis=1)
+        at, pair, other = at[near], pair[near], other[near]
+        s = self.exact
+        inside = are_inside(points[at], other, s.triangles, *s.trees, s.first)
+        return points[at[inside]], pair[inside], other[inside]
 
-def _some(rows: NDArray[Any], limit: int) -> NDArray[Any]:
-    """The rows, or evenly spread ones where there are more than `limit`."""
-    return rows[:: max(1, -(-len(rows) // limit))]
+    @cached_property
+    def places(self) -> Points:
+        """Where edges of one body go through faces of the other."""
+        s = self.exact
+        labels = kernels.tree_labels(self.flats.planes(self.noise / 2)[self.flats.of_triangle], s.first)
+        pair, i, j = kernels.straddling_pairs(
+            s.triangles, s.normals, *s.trees, labels, s.first, self.pairs, self.noise / 2
+        ).T
+        found: list[Points] = [(np.zeros((0, 3)), pair[:0])]
+        for one, other in ((i, j), (j, i)):
+            for k in range(3):
+                edges = s.triangles[one][:, [k, (k + 1) % 3]]
+                through, where = pierced(edges, s.triangles[other], s.normals[other], self.noise / 2)
+                found.append((where[through], pair[through]))
+        where, pair = (np.concatenate(x) for x in zip(*found))
+        return where, pair
 
+    def _amid(self) -> Points:
+        """Points halfway between any two places where an edge of one body goes through a face of the other.
 
-def _least_width(a: _Body, b: _Body) -> float:
-    """How far one of two bodies would have to move along the normal of some face to come clear: an upper bound."""
-    width = np.inf
-    for one, other in ((a, b), (b, a)):
-        normals = one.directions()
-        widths = (one.vertices @ normals.T).max(axis=0) - (other.vertices @ normals.T).min(axis=0)
-        width = min(width, float(widths.min()))
-    return width
+        Where one body goes right through the other, its faces look at none of the other's; these points lie in both.
+        """
+        where, pair = self.places
+        order = np.argsort(pair, kind="stable")
+        order = order[_spread(pair[order], MAX_PLACES)]
+        where, pair = where[order], pair[order]
+        counts = np.bincount(pair, minlength=len(self.pairs))
+        run, place = spans(counts[pair])
+        other = (np.cumsum(counts) - counts)[pair[run]] + place
+        once = run < other
+        return (where[run[once]] + where[other[once]]) / 2, pair[run[once]]
 
+    def _between(self, gaps: Array) -> Points:
+        """Points halfway between those pairs of faces that have passed one another."""
+        s, flats = self.exact, self.flats
+        labels = kernels.tree_labels(np.minimum(flats.of_triangle, 0), s.first)
+        near = kernels.facing_pairs(*s.trees, labels, s.normals, s.first, self.pairs, gaps, 1.0)
+        # Passed: each face has some corner beyond the other's plane.
+        ta, tb, na, nb = s.triangles[near[:, 1]], s.triangles[near[:, 2]], s.normals[near[:, 1]], s.normals[near[:, 2]]
+        passed = np.einsum("kcd,kd->kc", ta - tb[:, :1], nb).min(axis=1) < -self.noise / 2
+        passed &= np.einsum("kcd,kd->kc", tb - ta[:, :1], na).min(axis=1) < -self.noise / 2
+        near, ta, tb = near[passed], ta[passed], tb[passed]
+        origin, _, axes = self._planes(near, s.normals, s.middles)
+        areas, corners = kernels.common_parts((ta - origin) @ axes, (tb - origin) @ axes)
+        # A gap between two planes is widest at a corner, and balls have most room amid the part in common.
+        spots = [corners, (corners + np.roll(corners, 1, axis=1)) / 2, corners.mean(axis=1, keepdims=True)]
+        uv = np.concatenate(spots, axis=1)
+        row = np.repeat(np.flatnonzero(areas > 0), uv.shape[1])
+        found = [self._halfway(near[row], uv[areas > 0].reshape(-1, 2), s.normals, s.middles)]
+        large = flats.facing(self.pairs, float(gaps.max(initial=0.0)), 1.0)
+        if len(large):
+            origin, _, axes = self._planes(large, flats.normals, flats.middles)
+            one, two = (flats.polygons(f, origin[:, 0], axes) for f in large[:, 1:].T)
+            common = shapely.intersection(one, two, grid_size=self.noise / 10)
+            pieces, row = shapely.get_parts(shapely.constrained_delaunay_triangles(common), return_index=True)
+            uv = shapely.get_coordinates(shapely.centroid(pieces))
+            found.append(self._halfway(large[row], uv, flats.normals, flats.middles))
+        points, pair = (np.concatenate(x) for x in zip(*found))
+        return points, pair
 
-def _depth(a: _Body, b: _Body, noise: float, far: float) -> float:
-    """The depth of the overlap of two bodies; see the top of this module. `far`: how deep to look among many faces."""
-    low = np.maximum(a.vertices.min(axis=0), b.vertices.min(axis=0))
-    high = np.minimum(a.vertices.max(axis=0), b.vertices.max(axis=0))
-    # Surfaces farther off than the overlap is wide are nobody's nearest: depths beyond are not asked for.
-    margin = float((high - low).min())
-    middle = (low + high) / 2
-    near_a, near_b = _near(a, low - margin, high + margin), _near(b, low - margin, high + margin)
-    few = len(near_a.triangles) * len(near_b.triangles) <= DENSE
-    depth = 0.0
-    for one, other, around in ((a, b, near_b), (b, a, near_a)):
-        corners = one.vertices[((one.vertices >= low) & (one.vertices <= high)).all(axis=1)]
-        depth = max(depth, _deepest(corners - middle, [other.triangles - middle], [around.triangles - middle], noise))
-    pairs = np.argwhere(near_a.normals @ near_b.normals.T < _FACING) if few else _near_faces(near_a, near_b, far)
-    points = [_between(near_a, near_b, pairs, middle, noise)]
-    if not few:
-        points += [n.triangles.mean(axis=1) - far / 2 * n.normals - middle for n in (near_a, near_b)]
-    if few:
-        points.append(_amid(near_a, near_b, noise) - middle)
-    centres = np.concatenate(points)
-    surfaces = [a.triangles - middle, b.triangles - middle]
-    near = [near_a.triangles - middle, near_b.triangles - middle]
-    return max(depth, 2 * _deepest(centres, surfaces, near, noise / 2))
+    def _planes(self, faces: Numbers, normals: Array, middles: Array) -> tuple[Array, Array, Array]:
+        """Planes across the mean normal of two faces, (pair, both) int64 (n, 3): origins (n, 1, 3), normals, axes."""
+        along = normals[faces[:, 1]] - normals[faces[:, 2]]
+        along /= np.linalg.norm(along, axis=1, keepdims=True)
+        return middles[faces[:, 1], None], along, np.stack(plane_axes(along), axis=2)
 
-
-def _near(body: _Body, low: Array, high: Array) -> _Body:
-    lowest, highest = triangles.bounds(body.triangles)
-    kept = (lowest <= high).all(axis=1) & (highest >= low).all(axis=1)
-    return _Body(body.vertices, body.triangles[kept], body.normals[kept])
-
-
-def _deepest(points: Array, surfaces: list[Array], near: list[Array], noise: float) -> float:
-    """The largest distance of any of the points (n, 3) that lie within all surfaces from the nearest of them."""
-    points = _some(points, MAX_ASKED)
-    for surface in surfaces:
-        points = points[triangles.are_inside(points, surface)]
-    points = _some(points, MAX_MEASURED)
-    if not len(points):
-        return 0.0
-    faces = np.concatenate(near)
-    if not len(faces):
-        return 0.0
-    away = float(triangles.distances(points, faces).max())
-    return away if away > noise else 0.0
-
-
-def _near_faces(a: _Body, b: _Body, far: float) -> Numbers:
-    """Pairs (k, 2) of faces of two bodies that look at one another from no farther than `far`, or close to it."""
-    low, high = triangles.bounds(a.triangles)
-    rows, pairs = np.arange(len(low)), None
-    while pairs is None:
-        around = (low[rows] - far, high[rows] + far)
-        pairs = near_pairs(around, triangles.bounds(b.triangles), CHUNK)
-        rows = rows if pairs is not None else rows[::2]
-    pairs[:, 0] = rows[pairs[:, 0]]
-    facing = np.einsum("kd,kd->k", a.normals[pairs[:, 0]], b.normals[pairs[:, 1]]) < _FACING
-    return np.asarray(pairs[facing])
-
-
-def _between(a: _Body, b: _Body, pairs: Numbers, middle: Array, noise: float) -> Array:
-    """Points (n, 3), from `middle`, halfway between those pairs (k, 2) of faces that have passed one another."""
-    i, j = pairs.T
-    # Passed: each face has some corner beyond the other's plane.
-    ta, tb, na, nb = a.triangles[i] - middle, b.triangles[j] - middle, a.normals[i], b.normals[j]
-    passed = np.einsum("kcd,kd->kc", ta - tb[:, :1], nb).min(axis=1) < -noise / 2
-    passed &= np.einsum("kcd,kd->kc", tb - ta[:, :1], na).min(axis=1) < -noise / 2
-    chosen = _some(np.flatnonzero(passed), MAX_PATCHES)
-    ta, tb, na, nb = ta[chosen], tb[chosen], na[chosen], nb[chosen]
-    # Each pair of faces is looked at along the mean of its two normals: n, with u and v across.
-    n = na - nb
-    n /= np.linalg.norm(n, axis=1, keepdims=True)
-    axes = np.stack(triangles.plane_axes(n), axis=2)
-    patches = shapely.intersection(shapely.polygons(ta @ axes), shapely.polygons(tb @ axes))
-    wide = np.flatnonzero(shapely.area(patches) > 0)
-    uv, patch = _spots(patches[wide])
-    rows = wide[patch]
-    flat = np.einsum("kda,ka->kd", axes[rows], uv)
-    over_a, over_b = (np.einsum("kd,kd->k", t[rows, 0] - flat, m[rows]) for t, m in ((ta, na), (tb, nb)))
-    over_a /= np.einsum("kd,kd->k", na, n)[rows]
-    over_b /= np.einsum("kd,kd->k", nb, n)[rows]
-    passed = over_a - over_b > noise
-    points: Array = flat[passed] + (over_a + over_b)[passed, None] / 2 * n[rows[passed]]
-    return points
-
-
-def _amid(a: _Body, b: _Body, noise: float) -> Array:
-    """Points (n, 3) halfway between any two places where an edge of one body goes through a face of the other.
-
-    Where one body goes right through the other, its faces look at none of the other's; these points lie in both.
-    """
-    found = [np.zeros((0, 3))]
-    for one, other in ((a, b), (b, a)):
-        edges = np.concatenate([one.triangles[:, [k, (k + 1) % 3]] for k in range(3)])
-        # Each edge belongs to two faces, and is gone along once either way.
-        edges = edges[(edges[:, 0] < edges[:, 1]).argmax(axis=1) == (edges[:, 0] != edges[:, 1]).argmax(axis=1)]
-        around = (edges.min(axis=1), edges.max(axis=1))
-        pairs = near_pairs(around, triangles.bounds(other.triangles), CHUNK)
-        if pairs is not None and len(pairs):
-            i, j = pairs.T
-            through, where = triangles.pierced(edges[i], other.triangles[j], other.normals[j], noise / 2)
-            found.append(where[through])
-    places = _some(np.concatenate(found), MAX_PLACES)
-    i, j = np.triu_indices(len(places), 1)
-    halfway: Array = (places[i] + places[j]) / 2
-    return halfway
+    def _halfway(self, faces: Numbers, uv: Array, normals: Array, middles: Array) -> Points:
+        """Points between the planes of two faces, over points (n, 2) of a plane between, where they have passed."""
+        origin, along, axes = self._planes(faces, normals, middles)
+        flat = origin[:, 0] + np.einsum("nda,na->nd", axes, uv)
+        over_a, over_b = (
+            np.einsum("nd,nd->n", middles[f] - flat, normals[f]) / np.einsum("nd,nd->n", normals[f], along)
+            for f in faces[:, 1:].T
+        )
+        passed = over_a - over_b > self.noise
+        return (flat + (over_a + over_b)[:, None] / 2 * along)[passed], faces[passed, 0]
 
 
-def _spots(patches: NDArray[np.object_]) -> tuple[Array, Numbers]:
-    """Points (n, 2) of convex patches at which a gap may be widest, and the patch of each: centres, corners, edges."""
-    corners, patch = shapely.get_coordinates(shapely.get_exterior_ring(patches), return_index=True)
-    same = patch[1:] == patch[:-1]
-    edges = (corners[1:] + corners[:-1])[same] / 2
-    centres = shapely.get_coordinates(shapely.centroid(patches))
-    number = np.arange(len(patches))
-    return np.concatenate([centres, corners, edges]), np.concatenate([number, patch, patch[1:][same]])
+def _spread(group: Numbers, limit: int) -> NDArray[np.int64]:
+    """Rows of groups, int64 (n,), in order; evenly spread ones of groups of more than `limit`."""
+    counts = np.bincount(group) if len(group) else np.zeros(0, dtype=np.int64)
+    order = np.argsort(group, kind="stable")
+    rank = np.empty(len(group), dtype=np.int64)
+    rank[order] = np.arange(len(group)) - (np.cumsum(counts) - counts)[group[order]]
+    return np.flatnonzero(rank % np.maximum(1, -(-counts // limit))[group] == 0)

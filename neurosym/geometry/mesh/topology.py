@@ -9,6 +9,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from neurosym.geometry.mesh.connections import alike, opposite
 from neurosym.support.arrays import Array, Numbers, Truths
 
 #: Open edges beyond this number are a hole, not a row of T-junctions: nobody is asked to match them up.
@@ -17,10 +18,11 @@ MAX_OPEN_EDGES = 5_000
 
 def merged(vertices: Array, faces: Numbers, within: float = 0.0) -> tuple[Array, Numbers]:
     """Vertices in one place made one, unused ones dropped; `within` a length: chains of nearer ones, too."""
-    used, inverse = np.unique(faces, return_inverse=True)
+    used = np.zeros(len(vertices), dtype=bool)
+    used[faces] = True
     # Adding 0 turns -0 into 0.
-    vertices, faces = vertices[used] + 0.0, inverse.reshape(-1, 3)
-    groups, first = _alike(vertices)
+    vertices, faces = vertices[used] + 0.0, (np.cumsum(used) - 1)[faces]
+    groups, first = alike(vertices)
     vertices, faces = vertices[first], groups[faces]
     if within > 0:
         pairs = cKDTree(vertices).query_pairs(within, output_type="ndarray")
@@ -40,22 +42,12 @@ def without_repeats(faces: Numbers, *, cancel: bool = True) -> Numbers:
     # From the least corner on, so that one face has one form; the sign says which way round it goes.
     start = np.argmin(faces, axis=1)
     one, two, three = (faces[np.arange(len(faces)), (start + k) % 3] for k in range(3))
-    group, first = _alike(np.stack([one, np.minimum(two, three), np.maximum(two, three)], axis=1))
+    group, first = alike(np.stack([one, np.minimum(two, three), np.maximum(two, three)], axis=1))
     ways = np.zeros((len(first), 2), dtype=bool)
     ways[group, (two < three).astype(int)] = True
     kept = np.zeros(len(faces), dtype=bool)
     kept[first] = ~(cancel & ways.all(axis=1))
     return faces[kept]
-
-
-def _alike(rows: Array | Numbers) -> tuple[Numbers, Numbers]:
-    """Equal rows as groups: the group of each row, and the first row of each group."""
-    order = np.lexsort(rows.T[::-1])
-    new = np.ones(len(order), dtype=bool)
-    new[1:] = (rows[order[1:]] != rows[order[:-1]]).any(axis=1)
-    group = np.empty(len(order), dtype=np.int64)
-    group[order] = np.cumsum(new) - 1
-    return group, order[new]
 
 
 def _components(pairs: Numbers, count: int) -> Numbers:
@@ -66,11 +58,11 @@ def _components(pairs: Numbers, count: int) -> Numbers:
 def half_edges(faces: Numbers) -> tuple[Numbers, Numbers]:
     """The half edges of faces (m, 3): start and end, int64 (3 m, 2), and the number of the edge of each, (3 m,).
 
-    Half edge h belongs to face h % m.
+    Half edge h belongs to face h // 3.
     """
-    half = np.stack([faces.T.ravel(), faces[:, [1, 2, 0]].T.ravel()], axis=1)
-    low, high = half.min(axis=1), half.max(axis=1)
-    return half, np.unique(low * (int(faces.max()) + 1) + high, return_inverse=True)[1].astype(np.int64)
+    start, end = faces.ravel(), faces[:, [1, 2, 0]].ravel()
+    edge = alike(np.stack([np.minimum(start, end), np.maximum(start, end)], axis=1))[0]
+    return np.stack([start, end], axis=1), edge
 
 
 def _upward(half: Numbers) -> Array:
@@ -89,10 +81,10 @@ def open_edges(faces: Numbers) -> tuple[Numbers, bool]:
 
 def neighbours(faces: Numbers) -> tuple[Numbers, Truths]:
     """Faces that share an edge with each other and no third, int64 (k, 2), and whether both go along it alike."""
-    half, edge = half_edges(faces)
-    order = np.argsort(edge, kind="stable")
-    pairs = order[np.bincount(edge)[edge[order]] == 2].reshape(-1, 2)
-    return pairs % len(faces), half[pairs[:, 0], 0] == half[pairs[:, 1], 0]
+    other = opposite(faces)
+    half = np.flatnonzero(other > np.arange(len(other)))
+    start = faces.ravel()
+    return np.stack([half, other[half]], axis=1) // 3, start[half] == start[other[half]]
 
 
 def same_winding(faces: Numbers) -> Numbers | None:

@@ -1,22 +1,17 @@
-"""Triangles in bulk: which are near one another, which pierce one another, what is inside, how far the surface is."""
+"""Triangles in bulk: which pierce one another, what is inside, how far the surface is."""
 
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial import cKDTree
-from scipy.spatial.transform import Rotation
-from trimesh.triangles import closest_point
+from scipy.spatial import ConvexHull, QhullError
 
-from neurosym.geometry.mesh.broad_phase import CHUNK, near_pairs
+from neurosym.geometry.mesh import distances as points_and_trees
+from neurosym.geometry.mesh import kernels
+from neurosym.geometry.mesh.connections import adjacent, alike, has_valley
+from neurosym.geometry.mesh.flats import Flats
+from neurosym.geometry.mesh.topology import signed_volume
+from neurosym.geometry.mesh.trees import along_curve
 from neurosym.support.arrays import Array, Numbers, Truths
-
-#: A small fixed turn, so that rays upwards meet no edge of a mesh drawn along the axes, and bounds stay tight.
-_TILT = Rotation.from_rotvec([0.0137, -0.0219, 0.0171]).as_matrix()
-
-
-def bounds(triangles: Array) -> tuple[Array, Array]:
-    """Lowest and highest corners, float64 (m, 3) each, of triangles (m, 3, 3)."""
-    return triangles.min(axis=1), triangles.max(axis=1)
 
 
 def area_vectors(triangles: Array) -> Array:
@@ -31,55 +26,45 @@ def plane_axes(normals: Array) -> tuple[Array, Array]:
     return u, np.cross(normals, u)
 
 
-def are_convex(vertices: Array, triangles: Array, margin: float) -> bool:
-    """Whether no vertex (n, 3) lies above the plane of any triangle (m, 3, 3) by more than `margin`.
-
-    Only asked of meshes for which that is quick; of others the answer is no.
-    """
-    if len(vertices) * len(triangles) > 100 * CHUNK:
+def are_convex(vertices: Array, faces: Numbers, margin: float) -> bool:
+    """Whether no vertex (n, 3) of a closed mesh lies above the plane of any face (m, 3) by more than `margin`."""
+    faces = alike(vertices)[0][faces]
+    # Without a valley along any edge a surface is convex, unless it has several parts, or goes round more than once.
+    if has_valley(vertices, faces, adjacent(faces), margin):
         return False
-    normals = _unit_normals(triangles)
-    offsets = np.einsum("md,md->m", triangles[:, 0], normals)
-    step = max(1, 4 * CHUNK // len(triangles))
-    return all(
-        bool((vertices[start : start + step] @ normals.T <= offsets + margin).all())
-        for start in range(0, len(vertices), step)
-    )
+    try:
+        hull = ConvexHull(vertices[np.unique(faces)])
+    except QhullError:
+        return False
+    return bool(abs(hull.volume - signed_volume(vertices, faces)) <= 2 * margin * hull.area)
 
 
-def _unit_normals(triangles: Array) -> Array:
+def unit_normals(triangles: Array) -> Array:
+    """float64 (m, 3), outward; 0 for triangles without area."""
     normals = area_vectors(triangles)
     return np.asarray(normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300))
 
 
-def crossing_pairs(triangles: Array, margin: float, limit: int) -> Numbers | None:
-    """Pairs (k, 2), i < j, of triangles (m, 3, 3) of which an edge goes through the other, `margin` on either side.
+def crossing_pairs(vertices: Array, faces: Numbers, margin: float) -> Numbers:
+    """Pairs (k, 2) of faces (m, 3) of which an edge goes through the other, `margin` (length) on either side.
 
-    None when more than `limit` pairs would have to be looked at. Triangles that only touch, or lie in one plane, do
-    not cross.
+    Faces that only touch, or lie in one plane, do not cross.
     """
-    pairs = near_pairs(bounds(triangles), bounds(triangles), limit)
-    if pairs is None:
-        return None
-    normals = _unit_normals(triangles)
-    # Fans and flat caps have many neighbours in their own plane: known by one number, they are left out at once.
-    offset = np.einsum("md,md->m", triangles[:, 0], normals) / max(margin, 1e-300)
-    plane = np.unique(np.round(np.column_stack([normals * 1e6, offset])), axis=0, return_inverse=True)[1].ravel()
-    pairs = pairs[(pairs[:, 0] < pairs[:, 1]) & (plane[pairs[:, 0]] != plane[pairs[:, 1]])]
-    found = []
-    for start in range(0, len(pairs), CHUNK):
-        some = pairs[start : start + CHUNK]
-        for one, other in ((0, 1), (1, 0)):
-            plane_of, corners = some[:, one], triangles[some[:, other]]
-            height = np.einsum("kcd,kd->kc", corners - triangles[plane_of][:, :1], normals[plane_of])
-            some = some[(height.min(axis=1) < -margin) & (height.max(axis=1) > margin)]
-        i, j = some.T
-        hit = np.zeros(len(some), dtype=bool)
-        for k in range(3):
-            hit |= pierced(triangles[i][:, [k, (k + 1) % 3]], triangles[j], normals[j], margin)[0]
-            hit |= pierced(triangles[j][:, [k, (k + 1) % 3]], triangles[i], normals[i], margin)[0]
-        found.append(some[hit])
-    return np.concatenate(found) if found else pairs
+    body = np.zeros(len(faces), dtype=np.int64)
+    order = along_curve(vertices[faces[:, 0]], body)
+    t, vectors, middles, _ = kernels.measured(vertices, faces[order])
+    areas = np.linalg.norm(vectors, axis=1)
+    normals, first = vectors / np.maximum(areas, 1e-300)[:, None], np.array([0, len(t)])
+    # Fans and flat lids have many neighbours in their own plane.
+    flats = Flats.of(t, normals, areas, middles, body, adjacent(faces[order]), margin)
+    trees = kernels.tree_bounds(t, np.ones(len(t), dtype=bool), first)
+    labels = kernels.tree_labels(flats.of_triangle, first)
+    i, j = kernels.straddling_pairs(t, normals, *trees, labels, first, np.zeros((1, 2), dtype=np.int64), margin).T[1:]
+    hit = np.zeros(len(i), dtype=bool)
+    for k in range(3):
+        hit |= pierced(t[i][:, [k, (k + 1) % 3]], t[j], normals[j], margin)[0]
+        hit |= pierced(t[j][:, [k, (k + 1) % 3]], t[i], normals[i], margin)[0]
+    return order[np.stack([i[hit], j[hit]], axis=1)]
 
 
 def pierced(
@@ -103,48 +88,19 @@ def pierced(
 
 
 def are_inside(points: Array, triangles: Array) -> Truths:
-    """bool (n,): which points a closed surface (m, 3, 3) goes round, by counting its faces above each point."""
-    if not len(points) or not len(triangles):
-        return np.zeros(len(points), dtype=bool)
-    tilted, asked = triangles @ _TILT, points @ _TILT
-    # Seen from above: which faces lie over or under which points; heights are compared after.
-    flat = np.array([1.0, 1.0, 0.0])
-    low, high = bounds(tilted)
-    pairs = near_pairs((asked * flat, asked * flat), (low * flat, high * flat), 20 * CHUNK)
-    if pairs is None:
-        half = len(points) // 2
-        if not half:
-            raise MemoryError(f"{len(triangles):,} faces over one point")
-        return np.concatenate([are_inside(points[:half], triangles), are_inside(points[half:], triangles)])
-    i, j = pairs.T
-    t, p = tilted[j], asked[i]
-    area = _cross(t[:, 1] - t[:, 0], t[:, 2] - t[:, 0])
-    weights = [_cross(t[:, (k + 1) % 3] - t[:, k], p - t[:, k]) * np.sign(area) for k in range(3)]
-    over = (np.minimum(np.minimum(weights[0], weights[1]), weights[2]) >= 0) & (area != 0)
-    safe = np.where(area != 0, np.abs(area), 1.0)
-    over &= (weights[1] * t[:, 0, 2] + weights[2] * t[:, 1, 2] + weights[0] * t[:, 2, 2]) / safe > p[:, 2]
-    winding = np.bincount(i[over], weights=np.sign(area[over]), minlength=len(points))
-    return np.asarray(np.round(winding) > 0)
+    """bool (n,): which points a closed surface (m, 3, 3) goes round."""
+    inside: Truths = points_and_trees.are_inside(*_one_tree(points, triangles))
+    return inside
 
 
 def distances(points: Array, triangles: Array) -> Array:
-    """float64 (n,): how far each point is from the nearest of the triangles (m, 3, 3), of which there is one."""
-    # No triangle farther away than the nearest corner counts.
-    reach = cKDTree(triangles.reshape(-1, 3)).query(points)[0][:, None]
-    pairs = near_pairs((points - reach, points + reach), bounds(triangles), 20 * CHUNK)
-    if pairs is None:
-        half = len(points) // 2
-        if not half:
-            raise MemoryError(f"{len(triangles):,} faces near one point")
-        return np.concatenate([distances(points[:half], triangles), distances(points[half:], triangles)])
-    found: Array = reach[:, 0].copy()
-    for start in range(0, len(pairs), CHUNK):
-        i, j = pairs[start : start + CHUNK].T
-        nearest = closest_point(triangles[j], points[i])  # type: ignore[no-untyped-call]
-        np.minimum.at(found, i, np.linalg.norm(nearest - points[i], axis=1))
-    return found
+    """float64 (n,): how far each point is from the nearest of the triangles (m, 3, 3)."""
+    nearest: Array = points_and_trees.nearest(*_one_tree(points, triangles))
+    return nearest
 
 
-def _cross(u: Array, v: Array) -> Array:
-    product: Array = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
-    return product
+def _one_tree(points: Array, triangles: Array) -> tuple[Array, Numbers, Array, Array, Array, Numbers]:
+    one = np.zeros(len(triangles), dtype=np.int64)
+    t = triangles[along_curve(triangles[:, 0], one)]
+    first = np.array([0, len(t)])
+    return points, np.zeros(len(points), dtype=np.int64), t, *kernels.tree_bounds(t, one == 0, first), first

@@ -16,6 +16,7 @@ import numpy as np
 from neurosym.errors import AssemblyError, InputError
 from neurosym.geometry.assembly import FRICTION, Assembly, check_fixed
 from neurosym.geometry.bodies import Bodies
+from neurosym.geometry.contact.surfaces import BodySurfaces
 from neurosym.geometry.mesh import triangles
 from neurosym.geometry.notes import FaultyPartsError, Note
 from neurosym.geometry.readers.assembly_json import read_json
@@ -160,11 +161,12 @@ def _checked(contents: Contents, source: str, progress: Progress) -> Assembly:
     held = tuple(name for name in dict.fromkeys(contents.fixed) if name not in lost)
     check_fixed(held, [part.name for part in parts])
     bodies, mask = Bodies(parts), sum(1 << i for i, part in enumerate(parts) if part.name in held)
-    mated, mating, deep = mating_tolerances(bodies, mask, contents.tolerances)
+    surfaces = BodySurfaces(bodies)
+    mated, mating, deep = mating_tolerances(surfaces, mask, contents.tolerances)
     if faults or deep:
         raise FaultyPartsError(source, [*faults, *deep], contents.hint)
     ground = float(bodies.bounds[:, 0, 2].min()) if contents.table is None else contents.table
-    loose = floating(bodies, mask, ground, mated.touch * bodies.smallest_extent)
+    loose = floating(surfaces, mask, ground, mated.touch * bodies.smallest_extent)
     progress(total, total)
     friction = FRICTION if contents.friction is None else contents.friction
     notes = (*contents.notes, *mended, *mating, *loose)
@@ -242,8 +244,9 @@ def _wrong(part: Part) -> list[Note]:
             if n.kind in ("inverted", "winding")
         ]
         extent = float(np.ptp(body.shape.vertices, axis=0).max()) if not seen.faults else 0.0
-        corners = body.shape.vertices[body.shape.faces]
-        if isinstance(body.shape, Convex) and not triangles.are_convex(body.shape.vertices, corners, 1e-6 * extent):
+        if isinstance(body.shape, Convex) and not triangles.are_convex(
+            body.shape.vertices, body.shape.faces, 1e-6 * extent
+        ):
             said = f"Part {part.name!r} has a body that is said to be convex and is not."
             faults.append(Note(part.name, "convex", 0.0, said, "Give it as a mesh."))
     return faults

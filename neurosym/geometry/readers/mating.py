@@ -8,8 +8,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from neurosym.geometry.bodies import Bodies
-from neurosym.geometry.contact.collision import Gaps
 from neurosym.geometry.contact.overlaps import overlaps
+from neurosym.geometry.contact.surfaces import BodySurfaces
 from neurosym.geometry.mesh.broad_phase import overlapping_pairs
 from neurosym.geometry.notes import Note
 from neurosym.geometry.tolerances import DEFAULT_TOLERANCES, Tolerances
@@ -23,7 +23,7 @@ MAX_TOUCH = 0.5
 
 
 def mating_tolerances(
-    bodies: Bodies, fixed: int, stated: Tolerances | None
+    surfaces: BodySurfaces, fixed: int, stated: Tolerances | None
 ) -> tuple[Tolerances, list[Note], list[Note]]:
     """Tolerances that take the overlap of mating faces for touch, a note on it, and the overlaps that are too deep.
 
@@ -31,10 +31,11 @@ def mating_tolerances(
         fixed: a bitset of parts that may overlap one another.
         stated: tolerances that were given: they are kept.
     """
+    bodies = surfaces.bodies
     tolerances, smallest = stated or DEFAULT_TOLERANCES, bodies.smallest_extent
     limit = max(tolerances.touch, tolerances.mate)
     deepest: dict[tuple[int, int], float] = {}
-    for overlap in overlaps(bodies, fixed):
+    for overlap in overlaps(surfaces, fixed):
         pair = int(bodies.owners[overlap.a]), int(bodies.owners[overlap.b])
         deepest[pair] = max(deepest.get(pair, 0.0), overlap.depth)
     slight = {pair: depth for pair, depth in deepest.items() if depth <= limit * smallest}
@@ -67,7 +68,7 @@ def _too_deep(bodies: Bodies, i: int, j: int, depth: float, limit: float) -> Not
     return Note(a, "overlap", depth, said + f"mating faces may by {limit:g} of it.", remedy, b)
 
 
-def floating(bodies: Bodies, fixed: int, ground: float, touch: float) -> list[Note]:
+def floating(surfaces: BodySurfaces, fixed: int, ground: float, touch: float) -> list[Note]:
     """A note for each part that touches neither another one nor the ground, and is not fixed.
 
     Args:
@@ -75,23 +76,24 @@ def floating(bodies: Bodies, fixed: int, ground: float, touch: float) -> list[No
         ground: height (z, world).
         touch: how far apart two parts may be (length) that touch.
     """
+    bodies, exact = surfaces.bodies, surfaces.exact
     bounds, owners = bodies.bounds, bodies.owners
     held = np.array([bool(fixed >> i & 1) for i in range(len(bodies.parts))])
     held[owners[bounds[:, 0, 2] <= ground + touch]] = True
-    gaps = Gaps(bodies)
-    for a, b in overlapping_pairs(bounds[:, 0] - touch / 2, bounds[:, 1] + touch / 2, owners):
-        if not held[owners[[a, b]]].all() and gaps.between(int(a), int(b)) <= touch:
-            held[owners[[a, b]]] = True
+    pairs = overlapping_pairs(bounds[:, 0] - touch / 2, bounds[:, 1] + touch / 2, owners)
+    pairs = pairs[~held[owners[pairs]].all(axis=1)]
+    held[owners[pairs[exact.gaps(pairs, enough=touch, far=2 * touch) <= touch]]] = True
     notes = []
     for part in np.flatnonzero(~held):
         name = bodies.parts[part].name
         own, others = np.flatnonzero(owners == part), np.flatnonzero(owners != part)
-        away = np.maximum(bounds[own[0], 0] - bounds[others, 1], bounds[others, 0] - bounds[own[0], 1]).max(axis=1)
-        near = others[np.argsort(away)[:8]]
-        least, nearest = min(
-            ((gaps.between(int(i), int(j)), bodies.parts[owners[j]].name) for i in own[:64] for j in near),
-            default=(np.inf, ""),
-        )
+        least, nearest = np.inf, ""
+        for i in own[:64]:
+            away = np.maximum(bounds[i, 0] - bounds[others, 1], bounds[others, 0] - bounds[i, 1]).max(axis=1)
+            for j in others[np.argsort(away)[:8]]:
+                gap = float(exact.gaps(np.array([[i, j]]), far=least)[0])
+                if gap < least:
+                    least, nearest = gap, bodies.parts[owners[j]].name
         above = float(bodies.part_bounds[part, 0, 2] - ground)
         sentence = f"Part {name!r} touches nothing: it is {above:.4g} above the ground"
         sentence += f", and {least:.4g} from {nearest!r}, the nearest part." if nearest else "."

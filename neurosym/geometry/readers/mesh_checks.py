@@ -29,9 +29,6 @@ FLAT = 1e-9
 #: Faces that cross by less than this share of the part's smallest extent do no harm: touch is ten times as much.
 CROSSING = 1e-4
 
-#: Pairs of faces looked at for crossings; a mesh with more is noted as not looked through.
-MAX_PAIRS = 10_000_000
-
 #: Shells of one part whose order inside one another is looked at.
 MAX_SHELLS = 64
 
@@ -200,13 +197,9 @@ def _look_for_crossings(vertices: Array, faces: Numbers, found: _Findings) -> No
         said = f"crosses itself: {folds} pairs of neighbouring faces are folded onto one another"
         found.fault("self-intersecting", folds, said, "Cut its polygons into triangles before exporting it.")
         return
-    t = vertices[faces]
-    if triangles.are_convex(vertices, t, margin):
+    if triangles.are_convex(vertices, faces, margin):
         return
-    pairs = triangles.crossing_pairs(t, margin, MAX_PAIRS)
-    if pairs is None:
-        found.note("unchecked", len(faces), f"has {len(faces):,} faces, too many to look for crossings among them")
-        return
+    pairs = triangles.crossing_pairs(vertices, faces, margin)
     shells = topology.shells_of(faces)
     if not len(pairs):
         _look_for_nested(vertices, faces, found)
@@ -215,7 +208,7 @@ def _look_for_crossings(vertices: Array, faces: Numbers, found: _Findings) -> No
     within = shells[i] == shells[j]
     which = within if within.any() else ~within
     count = int(which.sum())
-    where = t[i[which][0]].mean(axis=0)
+    where = vertices[faces[i[which][0]]].mean(axis=0)
     at = f"{count} pairs of faces, one near ({', '.join(f'{x:.4g}' for x in where)})"
     if within.any():
         found.fault(

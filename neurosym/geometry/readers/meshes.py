@@ -52,7 +52,7 @@ def _one_body(vertices: Array, faces: Numbers) -> Body:
     X = np.eye(4)
     X[:3, 3] = centre
     local = vertices - centre
-    convex = are_convex(local, local[faces], 1e-9 * float(np.ptp(local)))
+    convex = are_convex(local, faces, 1e-9 * float(np.ptp(local)))
     return Body((Convex if convex else Mesh)(local, faces), X)
 
 

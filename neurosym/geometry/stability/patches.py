@@ -7,7 +7,8 @@ from collections.abc import Iterable
 import numpy as np
 
 from neurosym.geometry.assembly import Assembly
-from neurosym.geometry.contact.contacts import TABLE, Contact, hull_points
+from neurosym.geometry.contact.contacts import TABLE, Contact
+from neurosym.geometry.contact.planes import hull_points
 from neurosym.geometry.mesh.topology import volume_and_centre
 from neurosym.geometry.shapes import Box
 from neurosym.support.arrays import Array

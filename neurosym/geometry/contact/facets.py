@@ -1,0 +1,105 @@
+"""Where faces of bodies lie on one another: triangles clipped against triangles, large flat faces as polygons."""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+
+from neurosym.geometry.contact.planes import is_wide, polygon_area
+from neurosym.geometry.contact.surfaces import GRID, BodySurfaces
+from neurosym.geometry.mesh import kernels
+from neurosym.geometry.mesh.triangles import plane_axes
+from neurosym.support.arrays import Array, Numbers
+
+#: Bodies a and b, corners (k, 3), normal (3,) from a to b, area, gap: see `neurosym.geometry.contact.contacts.Contact`.
+Patch = tuple[int, int, Array, Array, float, float]
+
+
+def facet_patches(
+    surfaces: BodySurfaces, pairs: Numbers, *, sine: float, gap: float, touch: float, mate: float
+) -> list[Patch]:
+    """Patches in which bodies touch, all pairs (k, 2) at once; those of one pair in one plane are one.
+
+    Args:
+        sine: of the angle up to which normals count as opposite.
+        gap: how far apart (length) the faces may be.
+        touch: how wide a patch is at least (length).
+        mate: how deep (length) the faces may overlap.
+    """
+    exact, flats = surfaces.exact, surfaces.flats(1e-2 * touch)
+    # A flat face of many triangles has a number beyond theirs: two such are clipped as polygons.
+    m = len(exact.triangles)
+    normals, middles = (np.concatenate(x) for x in ((exact.normals, flats.normals), (exact.middles, flats.middles)))
+    labels = kernels.tree_labels(np.minimum(flats.of_triangle, 0), exact.first)
+    within = np.full(len(pairs), 2 * gap)
+    near = kernels.facing_pairs(*exact.trees, labels, exact.normals, exact.first, pairs, within, sine)
+    large = flats.facing(pairs, 2 * gap, sine)
+    of_pair, i, j = np.concatenate([near, np.add(large, (0, m, m))]).T
+    planes = _planes(of_pair, normals[i], middles[i], max(sine, 1e-3), 2 * mate)
+    if not planes:
+        return []
+    number = np.repeat(np.arange(len(planes)), [len(members) for members in planes])
+    of_pair, i, j = (x[np.concatenate(planes)] for x in (of_pair, i, j))
+    starts = np.flatnonzero(np.diff(number, prepend=-1))
+    origins = middles[i[starts]]
+    along = np.add.reduceat(normals[i] - normals[j], starts)
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    axes = np.stack(plane_axes(along), axis=2)  # (planes, 3, 2)
+
+    few = np.flatnonzero(i < m)
+    seen = [(exact.triangles[x[few]] - origins[number[few], None]) @ axes[number[few]] for x in (i, j)]
+    areas, corners = kernels.common_parts(*seen)
+    row, uv = np.repeat(few, corners.shape[1]), corners.reshape(-1, 2)
+    many = np.flatnonzero(i >= m)
+    if len(many):
+        # On a grid: with floating numbers GEOS may take two neighbours that share an edge for one and the same.
+        seen = [flats.polygons(x[many] - m, origins[number[many]], axes[number[many]]) for x in (i, j)]
+        common = shapely.intersection(*seen, grid_size=GRID * touch)
+        corners, place = shapely.get_coordinates(common, return_index=True)
+        areas, uv = np.concatenate([areas, shapely.area(common)]), np.concatenate([uv, corners])
+        row = np.concatenate([row, many[place]])
+    area = np.zeros(len(i))
+    area[np.concatenate([few, many])] = areas
+    # Where a line along the normal, through the middle of a part in common, meets one plane and the other.
+    count = np.bincount(row, minlength=len(i))
+    middle = np.stack([np.bincount(row, w, len(i)) / np.maximum(count, 1) for w in uv.T], axis=1)
+    middle = origins[number] + np.einsum("kde,ke->kd", axes[number], middle)
+    heights = [
+        np.einsum("kd,kd->k", normals[x], middles[x] - middle) / np.einsum("kd,kd->k", normals[x], along[number])
+        for x in (i, j)
+    ]
+    apart = heights[1] - heights[0]
+    area[(apart > gap) | (apart < -mate)] = 0.0
+    kept = area[row] > 0
+    total = np.bincount(number, area, len(planes))
+    gaps = np.bincount(number, area * np.maximum(apart, 0.0), len(planes)) / np.maximum(total, 1e-300)
+    patches: list[Patch] = []
+    for k, hull in _hulls(uv[kept], number[row[kept]], 1e-2 * touch):
+        points = origins[k] + hull @ axes[k].T
+        if is_wide(points, polygon_area(points, along[k]), touch):
+            a, b = pairs[of_pair[starts[k]]]
+            patches.append((int(a), int(b), points, along[k], float(total[k]), float(gaps[k])))
+    return patches
+
+
+def _planes(of_pair: Numbers, normals: Array, points: Array, sine: float, thickness: float) -> list[Numbers]:
+    """Rows of facing faces gathered by pair of bodies and, in it, by the plane of the first: normals, points (n, 3)."""
+    order = np.argsort(of_pair, kind="stable")
+    planes = []
+    for left in np.split(order, np.flatnonzero(np.diff(of_pair[order])) + 1):
+        while len(left):
+            same = normals[left] @ normals[left[0]] > 1 - sine**2 / 2
+            same &= np.abs((points[left] - points[left[0]]) @ normals[left[0]]) <= thickness
+            planes.append(left[same])
+            left = left[~same]
+    return planes
+
+
+def _hulls(uv: Array, group: Numbers, noise: float) -> list[tuple[int, Array]]:
+    """Corners of the convex hull of each group of points in the plane; those less than `noise` off an edge go."""
+    if not len(uv):
+        return []
+    order = np.argsort(group, kind="stable")
+    present, number = np.unique(group[order], return_inverse=True)
+    hulls = shapely.simplify(shapely.convex_hull(shapely.multipoints(uv[order], indices=number)), noise)
+    return [(int(k), shapely.get_coordinates(h)[:-1]) for k, h in zip(present, hulls) if h.geom_type == "Polygon"]
