@@ -16,9 +16,14 @@ F = TypeVar("F", bound=Callable[..., object])
 
 def compiled(function: F) -> F:
     """The function as machine code, once it is called; division by zero gives infinity, as in numpy."""
-    options = {"nogil": True, "error_model": "numpy"}
     try:
-        fast: F = njit(function, cache=True, **options)
-    except RuntimeError:  # neither place can be written: compiled anew in each process
-        fast = njit(function, **options)
+        fast: F = njit(function, cache=True, nogil=True, error_model="numpy")
+    except RuntimeError:  # neither place can be written: it is compiled anew in each process
+        fast = inlined(function)
+    return fast
+
+
+def inlined(function: F) -> F:
+    """The same for generators: numba 0.68 cannot load one from disk, but it keeps them with what calls them."""
+    fast: F = njit(function, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
     return fast

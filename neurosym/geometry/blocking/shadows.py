@@ -49,12 +49,12 @@ class Shadows:
         hit = np.zeros(len(pairs), dtype=bool)
         asked, most = np.arange(len(pairs)), _FEW
         while len(asked):
-            answers, of_pair, pieces = kernels.blocked(
+            answers, pieces = kernels.blocked(
                 self.triangles, *self._trees, self.first, pairs[asked], shifts[asked], self.touch, most
             )
             wide = answers == 1
             # Slivers side by side may be wide together: surfaces cut into narrow facets.
-            patches = shapely.polygons(pieces)
+            of_pair, patches = pieces[:, 0].astype(np.int64), shapely.polygons(pieces[:, 1:].reshape(-1, 8, 2))
             area = np.bincount(of_pair, shapely.area(patches), len(asked))
             for k in np.flatnonzero(area > self.touch**2):
                 together = shapely.union_all(patches[of_pair == k], grid_size=GRID * self.touch)

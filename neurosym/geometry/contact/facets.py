@@ -26,15 +26,16 @@ def facet_patches(
         touch: how wide a patch is at least (length).
         mate: how deep (length) the faces may overlap.
     """
-    exact, flats = surfaces.exact, surfaces.flats(1e-2 * touch)
+    exact, flats, (small, flat) = surfaces.exact, surfaces.flats, surfaces.split_trees
     # A flat face of many triangles has a number beyond theirs: two such are clipped as polygons.
     m = len(exact.triangles)
     normals, middles = (np.concatenate(x) for x in ((exact.normals, flats.normals), (exact.middles, flats.middles)))
-    labels = kernels.tree_labels(np.minimum(flats.of_triangle, 0), exact.first)
     within = np.full(len(pairs), 2 * gap)
-    near = kernels.facing_pairs(*exact.trees, labels, exact.normals, exact.first, pairs, within, sine)
-    large = flats.facing(pairs, 2 * gap, sine)
-    of_pair, i, j = np.concatenate([near, np.add(large, (0, m, m))]).T
+    near = [
+        kernels.facing_pairs(*one, *two, exact.normals, exact.first, pairs, within, sine)
+        for one, two in ((small, exact.trees), (flat, small))
+    ]
+    of_pair, i, j = np.concatenate([*near, np.add(flats.facing(pairs, 2 * gap, sine), (0, m, m))]).T
     planes = _planes(of_pair, normals[i], middles[i], max(sine, 1e-3), 2 * mate)
     if not planes:
         return []

@@ -62,9 +62,13 @@ def overlaps(surfaces: BodySurfaces, fixed: int = 0) -> list[Overlap]:
     if not len(pairs):
         return []
     whole = float(np.ptp(bodies.bounds, axis=(0, 1)).sum())
-    first = _Pairs(surfaces, pairs, noise)
-    # Only of bodies that overlap in some point faces are compared.
-    pairs = pairs[first.overlapping()]
+    # Where surfaces keep apart, bodies overlap only as one lies within the other; only of bodies that overlap in some
+    # point faces are compared.
+    near = surfaces.exact.gaps(pairs, enough=noise, far=2 * noise) <= noise
+    overlap = np.zeros(len(pairs), dtype=bool)
+    overlap[near] = _Pairs(surfaces, pairs[near], noise).overlapping()
+    overlap[~near] = _Pairs(surfaces, pairs[~near], noise).contained()
+    pairs = pairs[overlap]
     count = np.diff(surfaces.exact.first)[pairs].prod(axis=1)
     depths = [np.zeros(0)]
     for rows in np.split(np.arange(len(pairs)), np.flatnonzero(np.diff(np.cumsum(count) // _AT_A_TIME)) + 1):
@@ -79,10 +83,15 @@ class _Pairs:
     """Pairs of bodies, int64 (k, 2)."""
 
     def __init__(self, surfaces: BodySurfaces, pairs: Numbers, noise: float) -> None:
-        self.surfaces, self.exact, self.flats = surfaces, surfaces.exact, surfaces.flats(noise / 2)
-        self.pairs, self.noise = pairs, noise
+        self.surfaces, self.exact, self.pairs, self.noise = surfaces, surfaces.exact, pairs, noise
         bounds = surfaces.bodies.bounds[pairs]
         self.low, self.high = bounds[:, :, 0].max(axis=1), bounds[:, :, 1].min(axis=1)
+
+    def contained(self) -> Truths:
+        """Whether a part of the surface of either body lies within the other, where surfaces do not cross."""
+        within = np.zeros(len(self.pairs), dtype=bool)
+        within[self._in_other(*self.exact.shells)[1]] = True
+        return within
 
     def overlapping(self) -> Truths:
         """Whether a corner, the middle of an edge or a point just under a face lies within the other body, or an edge
@@ -91,10 +100,13 @@ class _Pairs:
         under = s.middles - 2 * self.noise * s.normals
         edges = [(s.triangles[:, k] + s.triangles[:, (k + 1) % 3]) / 2 for k in range(3)]
         overlap = np.zeros(len(self.pairs), dtype=bool)
-        overlap[self.places[1]] = True
+        if len(self.pairs):
+            overlap[self.places[1]] = True
         probes = [(s.vertices, s.first_vertex), (under, s.first), *((e, s.first) for e in edges)]
-        for points, first in probes:
-            overlap[self._in_other(points, first, ~overlap)[1]] = True
+        for probe, first in probes:
+            points, pair, other = self._in_other(probe, first, ~overlap)
+            # On the surface itself a point may seem to be on either side.
+            overlap[pair[nearest(points, other, s.triangles, *s.trees, s.first) > self.noise / 2]] = True
         return overlap
 
     def depths(self, gaps: Array) -> Array:
@@ -135,11 +147,13 @@ class _Pairs:
     @cached_property
     def places(self) -> Points:
         """Where edges of one body go through faces of the other."""
-        s = self.exact
-        labels = kernels.tree_labels(self.flats.planes(self.noise / 2)[self.flats.of_triangle], s.first)
-        pair, i, j = kernels.straddling_pairs(
-            s.triangles, s.normals, *s.trees, labels, s.first, self.pairs, self.noise / 2
-        ).T
+        s, flats, (small, flat) = self.exact, self.surfaces.flats, self.surfaces.split_trees
+        # Large flat faces in one plane do not go through one another, however many triangles they have.
+        planes = kernels.tree_labels(flats.planes(self.noise / 2)[flats.of_triangle], s.first)
+        none, rest = np.full(len(planes), -1), (s.triangles, s.normals, s.first, self.pairs, self.noise / 2)
+        passes = ((small, s.trees, none), (flat, small, none), (flat, flat, planes))
+        crossing = [kernels.straddling_pairs(*one, *two, labels, *rest) for one, two, labels in passes]
+        pair, i, j = np.concatenate(crossing).T
         found: list[Points] = [(np.zeros((0, 3)), pair[:0])]
         for one, other in ((i, j), (j, i)):
             for k in range(3):
@@ -166,9 +180,11 @@ class _Pairs:
 
     def _between(self, gaps: Array) -> Points:
         """Points halfway between those pairs of faces that have passed one another."""
-        s, flats = self.exact, self.flats
-        labels = kernels.tree_labels(np.minimum(flats.of_triangle, 0), s.first)
-        near = kernels.facing_pairs(*s.trees, labels, s.normals, s.first, self.pairs, gaps, 1.0)
+        s, flats, (small, flat) = self.exact, self.surfaces.flats, self.surfaces.split_trees
+        passes = ((small, s.trees), (flat, small))
+        near = np.concatenate(
+            [kernels.facing_pairs(*one, *two, s.normals, s.first, self.pairs, gaps, 1.0) for one, two in passes]
+        )
         # Passed: each face has some corner beyond the other's plane.
         ta, tb, na, nb = s.triangles[near[:, 1]], s.triangles[near[:, 2]], s.normals[near[:, 1]], s.normals[near[:, 2]]
         passed = np.einsum("kcd,kd->kc", ta - tb[:, :1], nb).min(axis=1) < -self.noise / 2

@@ -9,15 +9,22 @@ import numpy as np
 
 from neurosym.geometry.bodies import Bodies
 from neurosym.geometry.mesh import kernels
-from neurosym.geometry.mesh.connections import adjacent, alike
+from neurosym.geometry.mesh.connections import adjacent, alike, planar_regions
 from neurosym.geometry.mesh.distances import surface_gaps
 from neurosym.geometry.mesh.flats import Flats
 from neurosym.geometry.mesh.trees import along_curve
-from neurosym.support.arrays import Array, Numbers
+from neurosym.support.arrays import Array, Numbers, Truths
 
 #: Polygons are clipped on a grid of this share of the touching tolerance: with floating numbers GEOS may take two
 #: neighbours that share an edge for one and the same (seen with shapely 2 at coordinates of 1e-3).
 GRID = 1e-3
+
+#: Corners of a flat face lie in its plane to this share of the smallest extent: 32-bit numbers have steps of 1e-7.
+FLAT = 1e-5
+
+
+#: Lowest and highest corners, float64 (2 m, 3) each.
+Trees = tuple[Array, Array]
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,15 +76,26 @@ class Surfaces:
         return Surfaces(triangles, normals, middles, areas, body, first, points, first_vertex, corners)
 
     @cached_property
-    def trees(self) -> tuple[Array, Array]:
-        """Bounds of the nodes of the bodies' trees, float64 (2 m, 3) each; see `neurosym.geometry.mesh.kernels`."""
-        return kernels.tree_bounds(self.triangles, np.ones(len(self.triangles), dtype=bool), self.first)
+    def trees(self) -> Trees:
+        """Bounds of the nodes of the bodies' trees; see `neurosym.geometry.mesh.kernels`."""
+        return self.trees_of(np.ones(len(self.triangles), dtype=bool))
+
+    def trees_of(self, used: Truths) -> Trees:
+        """The same, of some of the triangles, bool (m,), alone."""
+        return kernels.tree_bounds(self.triangles, used, self.first)
 
     @cached_property
     def across(self) -> Numbers:
         """The triangle across each edge, int64 (m, 3); -1 where there is not just one."""
         body = np.repeat(np.arange(len(self.first) - 1), np.diff(self.first_vertex))
         return adjacent(alike(np.column_stack([self.vertices, body]))[0][self.corners])
+
+    @cached_property
+    def shells(self) -> tuple[Array, Numbers]:
+        """A corner of each connected part of each surface, float64 (s, 3), body by body, with `first` likewise."""
+        order, anything = np.arange(len(self.body)), np.inf
+        starts = planar_regions(self.triangles, self.normals, self.across, order, anything, -2.0)[1]
+        return self.triangles[starts, 0], np.searchsorted(self.body[starts], np.arange(len(self.first)))
 
     def gaps(self, pairs: Numbers, *, enough: float = 0.0, far: float = np.inf) -> Array:
         """float64 (k,): how far apart the surfaces of bodies (k, 2) are, 0 where they cross.
@@ -92,16 +110,20 @@ class BodySurfaces:
 
     def __init__(self, bodies: Bodies) -> None:
         self.bodies = bodies
-        self._flats: dict[float, Flats] = {}
 
     @cached_property
     def exact(self) -> Surfaces:
         """The bodies as they are."""
         return Surfaces.of(self.bodies)
 
-    def flats(self, within: float) -> Flats:
-        """Their large flat faces, to `within` (length)."""
-        if within not in self._flats:
-            s = self.exact
-            self._flats[within] = Flats.of(s.triangles, s.normals, s.areas, s.middles, s.body, s.across, within)
-        return self._flats[within]
+    @cached_property
+    def flats(self) -> Flats:
+        """Their large flat faces."""
+        s, within = self.exact, FLAT * self.bodies.smallest_extent
+        return Flats.of(s.triangles, s.normals, s.areas, s.middles, s.body, s.across, within)
+
+    @cached_property
+    def split_trees(self) -> tuple[Trees, Trees]:
+        """Trees of the triangles that are in no large flat face, and of those that are."""
+        flat = self.flats.of_triangle >= 0
+        return self.exact.trees_of(~flat), self.exact.trees_of(flat)

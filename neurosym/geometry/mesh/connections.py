@@ -81,7 +81,7 @@ def _across(edge: Numbers, count: Numbers) -> Numbers:
 
 @compiled
 def planar_regions(
-    corners: Array, normals: Array, across: Numbers, order: Numbers, within: float
+    corners: Array, normals: Array, across: Numbers, order: Numbers, within: float, cosine: float
 ) -> tuple[Numbers, Numbers]:
     """Regions of triangles that are joined by edges and lie in one plane: of each (m,), and the first one of each.
 
@@ -90,6 +90,7 @@ def planar_regions(
         across: int64 (m, 3), see `adjacent`.
         order: in which triangles are taken as the first of a region.
         within: how far from the plane (length) a corner may be.
+        cosine: of the largest angle between normals.
     """
     region, firsts = np.full(len(corners), -1, dtype=np.int64), np.empty(len(corners), dtype=np.int64)
     waiting = np.empty(3 * len(corners) + 1, dtype=np.int64)
@@ -107,10 +108,10 @@ def planar_regions(
             for other in across[t]:
                 if other < 0 or region[other] >= 0:
                     continue
-                cosine = 0.0
+                turn = 0.0
                 for k in range(3):
-                    cosine += normals[other, k] * normals[seed, k]
-                flat = cosine > 0.999999
+                    turn += normals[other, k] * normals[seed, k]
+                flat = turn >= cosine
                 for c in range(3):
                     height = 0.0
                     for k in range(3):

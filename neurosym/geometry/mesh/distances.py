@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from neurosym.support.arrays import Array, Numbers, Truths
-from neurosym.support.compiled import compiled
+from neurosym.support.compiled import compiled, inlined
 
 Vector = Any  # three numbers
 
@@ -43,7 +43,7 @@ def are_inside(points: Array, body: Numbers, triangles: Array, low: Array, high:
     return inside
 
 
-@compiled
+@inlined
 def _crossed(p: Array, t: Array) -> int:
     """1 where the ray from a point leaves through a triangle, -1 where it enters, 0 where it does neither."""
     signs = 0
@@ -126,7 +126,7 @@ def surface_gaps(
     return gaps
 
 
-@compiled
+@inlined
 def _box_distance(low: Array, high: Array, low_b: Array, high_b: Array) -> float:
     """The square of the distance of two boxes."""
     square = 0.0
@@ -136,38 +136,38 @@ def _box_distance(low: Array, high: Array, low_b: Array, high_b: Array) -> float
     return square
 
 
-@compiled
+@inlined
 def _size(low: Array, high: Array) -> float:
     size: float = high[0] - low[0] + high[1] - low[1] + high[2] - low[2]
     return size
 
 
-@compiled
+@inlined
 def _minus(a: Vector, b: Vector) -> Vector:
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
-@compiled
+@inlined
 def _plus(a: Vector, share: float, u: Vector) -> Vector:
     return a[0] + share * u[0], a[1] + share * u[1], a[2] + share * u[2]
 
 
-@compiled
+@inlined
 def _dot(a: Vector, b: Vector) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@compiled
+@inlined
 def _cross(a: Vector, b: Vector) -> Vector:
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-@compiled
+@inlined
 def _normal(t: Array) -> Vector:
     return _cross(_minus(t[1], t[0]), _minus(t[2], t[0]))
 
 
-@compiled
+@inlined
 def _over(p: Vector, t: Array, n: Vector) -> bool:
     """Whether the foot of a point on the plane of a triangle of normal n lies in the triangle."""
     for k in range(3):
@@ -177,7 +177,7 @@ def _over(p: Vector, t: Array, n: Vector) -> bool:
     return True
 
 
-@compiled
+@inlined
 def _to_segment(p: Vector, a: Vector, b: Vector) -> float:
     along, away = _minus(b, a), _minus(p, a)
     share = min(max(_dot(away, along) / max(_dot(along, along), 1e-300), 0.0), 1.0)
@@ -185,7 +185,7 @@ def _to_segment(p: Vector, a: Vector, b: Vector) -> float:
     return _dot(off, off)
 
 
-@compiled
+@inlined
 def _to_triangle(p: Vector, t: Array) -> float:
     """The square of the distance of a point from a triangle."""
     n = _normal(t)
@@ -195,7 +195,7 @@ def _to_triangle(p: Vector, t: Array) -> float:
     return min(_to_segment(p, t[0], t[1]), _to_segment(p, t[1], t[2]), _to_segment(p, t[2], t[0]))
 
 
-@compiled
+@inlined
 def _between_segments(a: Vector, b: Vector, c: Vector, d: Vector) -> float:
     """The square of the distance of two segments (Ericson, "Real-time collision detection", 2005, 5.1.9)."""
     u, v, w = _minus(b, a), _minus(d, c), _minus(a, c)
@@ -208,7 +208,7 @@ def _between_segments(a: Vector, b: Vector, c: Vector, d: Vector) -> float:
     return _dot(off, off)
 
 
-@compiled
+@inlined
 def _pierces(a: Vector, b: Vector, t: Array, n: Vector) -> bool:
     """Whether a segment goes through a triangle of normal n."""
     start, end = _dot(n, _minus(a, t[0])), _dot(n, _minus(b, t[0]))
@@ -217,7 +217,7 @@ def _pierces(a: Vector, b: Vector, t: Array, n: Vector) -> bool:
     return _over(_plus(a, start / (start - end), _minus(b, a)), t, n)
 
 
-@compiled
+@inlined
 def _apart(s: Array, t: Array) -> float:
     """The square of the distance of two triangles."""
     best, n, m = np.inf, _normal(s), _normal(t)

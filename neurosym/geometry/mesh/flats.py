@@ -11,6 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from neurosym.geometry.mesh.broad_phase import overlapping_pairs
 from neurosym.geometry.mesh.connections import planar_regions
@@ -54,7 +57,7 @@ class Flats:
             within: how far from their plane (length) corners may be.
         """
         by_area = np.argsort(-areas, kind="stable")
-        region, largest = planar_regions(t, normals, across, by_area, within)
+        region, largest = planar_regions(t, normals, across, by_area, within, 1 - 1e-6)
         many = np.flatnonzero(np.bincount(region, minlength=len(largest)) >= MANY)
         number = np.full(len(largest) + 1, -1)
         number[many] = np.arange(len(many))
@@ -92,13 +95,14 @@ class Flats:
 
     def planes(self, within: float) -> Numbers:
         """int64 (n + 1,): faces in one plane, to `within` (length), bear one number; -1 at the end is of no face."""
-        number = np.full(len(self.body) + 1, -1)
-        for f in range(len(self.body)):
-            if number[f] < 0:
-                aligned = np.abs(self.normals @ self.normals[f]) > 1 - 1e-9
-                aligned &= np.abs((self.middles - self.middles[f]) @ self.normals[f]) <= within
-                number[:-1][aligned & (number[:-1] < 0)] = f
-        return number
+        count = len(self.body)
+        offsets = np.einsum("nd,nd->n", self.normals, self.middles) / within
+        planes = np.column_stack([1e6 * self.normals, offsets])
+        # A plane has two sides: either way round it is one.
+        tree = cKDTree(np.concatenate([planes, -planes]))
+        one, other = tree.query_pairs(1.0, p=np.inf, output_type="ndarray").T % max(count, 1)
+        links = coo_array((np.ones(len(one), dtype=bool), (one, other)), shape=(count, count))
+        return np.append(connected_components(links, directed=False)[1], -1) if count else np.full(1, -1)
 
     def polygons(self, faces: Numbers, origins: Array, axes: Array) -> NDArray[np.object_]:
         """Faces (n,) seen in planes of origins (n, 3) and two unit vectors each (n, 3, 2)."""

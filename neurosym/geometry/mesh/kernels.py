@@ -8,11 +8,13 @@ and the leaf n + t for triangle t; the bounds of its node k are row 2 first[b] +
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from neurosym.support.arrays import Array, Numbers, Truths
-from neurosym.support.compiled import compiled
+from neurosym.support.compiled import compiled, inlined
 
 
 @compiled
@@ -70,7 +72,8 @@ def tree_labels(labels: Numbers, first: Numbers) -> Numbers:
     nodes = np.full(2 * len(labels), -1, dtype=np.int64)
     for b in range(len(first) - 1):
         n, base = first[b + 1] - first[b], 2 * first[b]
-        nodes[base + n : base + 2 * n] = labels[first[b] : first[b + 1]]
+        for t in range(n):
+            nodes[base + n + t] = labels[first[b] + t]
         for node in range(base + n - 1, base, -1):
             child = 2 * node - base
             if nodes[child] == nodes[child + 1]:
@@ -78,7 +81,7 @@ def tree_labels(labels: Numbers, first: Numbers) -> Numbers:
     return nodes
 
 
-@compiled
+@inlined
 def meeting(
     low: Array, high: Array, low_b: Array, high_b: Array, labels: Numbers, first: Numbers, pair: Numbers,
     shift: Array, gap: float,
@@ -87,14 +90,14 @@ def meeting(
 
     Numbers with one label of 0 or more are left out. Of a body with itself each pair comes once.
     """
-    a, b = pair
+    a, b = pair[0], pair[1]
     n, m, base, base_b = first[a + 1] - first[a], first[b + 1] - first[b], 2 * first[a], 2 * first[b]
     waiting = np.empty((256, 2), dtype=np.int64)
-    waiting[0] = 1
+    waiting[0, 0] = waiting[0, 1] = 1
     top = 1 if n and m else 0
     while top:
         top -= 1
-        p, q = waiting[top]
+        p, q = waiting[top, 0], waiting[top, 1]
         x, y = base + p, base_b + q
         size = 0.0
         for k in range(3):
@@ -107,8 +110,8 @@ def meeting(
             if p >= n and q >= m:
                 yield first[a] + p - n, first[b] + q - m
             elif a == b and p == q:
-                waiting[top] = 2 * p
-                waiting[top + 1] = 2 * p + 1
+                waiting[top, 0], waiting[top, 1] = 2 * p, 2 * p
+                waiting[top + 1, 0], waiting[top + 1, 1] = 2 * p + 1, 2 * p + 1
                 waiting[top + 2, 0], waiting[top + 2, 1] = 2 * p, 2 * p + 1
                 top += 3
             elif q >= m or (p < n and not size < 0):
@@ -121,15 +124,15 @@ def meeting(
                 top += 2
 
 
-@compiled
+@inlined
 def keep(points: Array, count: int, kept: Array, c: float, cx: float, cy: float) -> int:
     """Where c + cx x + cy y >= 0 in a convex polygon (Sutherland and Hodgman 1974), into `kept`: number of corners."""
     n = 0
     if count:
-        x0, y0 = points[count - 1]
+        x0, y0 = points[count - 1, 0], points[count - 1, 1]
         before = c + cx * x0 + cy * y0
     for k in range(count):
-        x, y = points[k]
+        x, y = points[k, 0], points[k, 1]
         here = c + cx * x + cy * y
         if (before >= 0) != (here >= 0):
             share = before / (before - here)
@@ -142,7 +145,7 @@ def keep(points: Array, count: int, kept: Array, c: float, cx: float, cy: float)
     return n
 
 
-@compiled
+@inlined
 def clip(a: Array, b: Array, dx: float, dy: float, one: Array, two: Array) -> int:
     """The common part of two triangles of the plane, corners in the first two columns, the second moved: into `one`."""
     area = (a[1, 0] - a[0, 0]) * (a[2, 1] - a[0, 1]) - (a[1, 1] - a[0, 1]) * (a[2, 0] - a[0, 0])
@@ -157,23 +160,23 @@ def clip(a: Array, b: Array, dx: float, dy: float, one: Array, two: Array) -> in
         one, two = two, one
     # Three turns: the last went into what came as `two`.
     for k in range(n):
-        two[k] = one[k]
+        two[k, 0], two[k, 1] = one[k, 0], one[k, 1]
     return n
 
 
-@compiled
+@inlined
 def area_and_rim(points: Array, n: int) -> tuple[float, float]:
     """Area and circumference of a convex polygon, either way round."""
     area = rim = 0.0
     for k in range(n):
-        x, y = points[k] - points[0]
-        x1, y1 = points[(k + 1) % n] - points[0]
+        x, y = points[k, 0] - points[0, 0], points[k, 1] - points[0, 1]
+        x1, y1 = points[(k + 1) % n, 0] - points[0, 0], points[(k + 1) % n, 1] - points[0, 1]
         area += x * y1 - y * x1
-        rim += np.hypot(x1 - x, y1 - y)
+        rim += np.sqrt((x1 - x) ** 2 + (y1 - y) ** 2)
     return abs(area) / 2, rim
 
 
-@compiled
+@inlined
 def slope(t: Array) -> tuple[float, float]:
     """How the height (third column) of a triangle changes along the first two."""
     x1, y1, h1 = t[1, 0] - t[0, 0], t[1, 1] - t[0, 1], t[1, 2] - t[0, 2]
@@ -186,7 +189,7 @@ def slope(t: Array) -> tuple[float, float]:
 def blocked(
     triangles: Array, low: Array, high: Array, low_b: Array, high_b: Array, first: Numbers, pairs: Numbers,
     shifts: Array, touch: float, most: int,
-) -> tuple[Numbers, Numbers, Array]:  # fmt: skip
+) -> tuple[Numbers, Array]:  # fmt: skip
     """Whether the first body of each pair (k, 2) hits the second, moved by its shift (k, 3), on its way up to infinity.
 
     Args:
@@ -198,10 +201,10 @@ def blocked(
 
     Returns:
         int64 (k,): 1 for a hit, 0 for none, 2 where there are more narrow pieces than `most`; and the narrow pieces of
-        pairs not hit: the pair of each (n,), and its corners (n, 8, 2), the last one repeated.
+        pairs not hit, float64 (n, 1 + 16): number of the pair, and eight corners, the last one repeated.
     """
     answers = np.zeros(len(pairs), dtype=np.int64)
-    of_pair, pieces = np.empty(64, dtype=np.int64), np.empty((64, 8, 2))
+    pieces = np.empty((64, 17))
     labels = np.full(len(low), -1, dtype=np.int64)
     one, two = np.empty((12, 2)), np.empty((12, 2))
     count = 0
@@ -227,42 +230,53 @@ def blocked(
                 if count - began == most:
                     answers[k] = 2
                     break
-                if count == len(pieces):
-                    of_pair = np.concatenate((of_pair, of_pair))
-                    pieces = np.concatenate((pieces, pieces))
-                of_pair[count] = k
-                for corner in range(8):
-                    pieces[count, corner] = two[min(corner, n - 1)]
+                pieces = room_for(pieces, count)
+                pieces[count, 0] = k
+                for c in range(8):
+                    pieces[count, 1 + 2 * c] = two[min(c, n - 1), 0]
+                    pieces[count, 2 + 2 * c] = two[min(c, n - 1), 1]
                 count += 1
-    return answers, of_pair[:count], pieces[:count]
+    return answers, pieces[:count]
+
+
+@inlined
+def room_for(rows: NDArray[Any], count: int) -> NDArray[Any]:
+    """Rows of numbers in an array that has room for one more than the first `count` of them."""
+    if count < len(rows):
+        return rows
+    larger = np.empty((2 * len(rows), rows.shape[1]), dtype=rows.dtype)
+    for r in range(count):
+        for k in range(rows.shape[1]):
+            larger[r, k] = rows[r, k]
+    return larger
 
 
 @compiled
 def facing_pairs(
-    low: Array, high: Array, labels: Numbers, normals: Array, first: Numbers, pairs: Numbers, gaps: Array, sine: float
-) -> Numbers:
+    low: Array, high: Array, low_b: Array, high_b: Array, normals: Array, first: Numbers, pairs: Numbers, gaps: Array,
+    sine: float,
+) -> Numbers:  # fmt: skip
     """Triangles of two bodies that look at one another from no farther than a gap: number of the pair, both, (n, 3).
 
     Args:
         gaps: float64 (k,): of each pair of bodies.
         sine: of the largest angle between one normal (m, 3) and the other turned round; 1: any less than square.
     """
-    near = np.empty((64, 3), dtype=np.int64)
+    near, labels = np.empty((64, 3), dtype=np.int64), np.full(len(low), -1, dtype=np.int64)
     count, still = 0, np.zeros(3)
     for k in range(len(pairs)):
-        for i, j in meeting(low, high, low, high, labels, first, pairs[k], still, gaps[k]):
+        for i, j in meeting(low, high, low_b, high_b, labels, first, pairs[k], still, gaps[k]):
             a, b = normals[i], normals[j]
             if a[0] * b[0] + a[1] * b[1] + a[2] * b[2] < -0.1:
                 x, y, z = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
                 if x * x + y * y + z * z <= sine * sine:
-                    if count == len(near):
-                        near = np.concatenate((near, near))
+                    near = room_for(near, count)
                     near[count, 0], near[count, 1], near[count, 2] = k, i, j
                     count += 1
     return near[:count]
 
 
-@compiled
+@inlined
 def straddles(corners: Array, other: Array, normal: Array, margin: float) -> bool:
     """Whether a triangle reaches beyond the plane of another one of a normal, by a margin on either side."""
     least = most = 0.0
@@ -276,18 +290,17 @@ def straddles(corners: Array, other: Array, normal: Array, margin: float) -> boo
 
 @compiled
 def straddling_pairs(
-    triangles: Array, normals: Array, low: Array, high: Array, labels: Numbers, first: Numbers, pairs: Numbers,
-    margin: float,
+    low: Array, high: Array, low_b: Array, high_b: Array, labels: Numbers, triangles: Array, normals: Array,
+    first: Numbers, pairs: Numbers, margin: float,
 ) -> Numbers:  # fmt: skip
     """Triangles of two bodies, or of one, that reach beyond one another's planes: pair and both, int64 (n, 3)."""
     near = np.empty((64, 3), dtype=np.int64)
     count, still = 0, np.zeros(3)
     for k in range(len(pairs)):
-        for i, j in meeting(low, high, low, high, labels, first, pairs[k], still, 0.0):
+        for i, j in meeting(low, high, low_b, high_b, labels, first, pairs[k], still, 0.0):
             crosses = i != j and straddles(triangles[i], triangles[j], normals[j], margin)
             if crosses and straddles(triangles[j], triangles[i], normals[i], margin):
-                if count == len(near):
-                    near = np.concatenate((near, near))
+                near = room_for(near, count)
                 near[count, 0], near[count, 1], near[count, 2] = k, i, j
                 count += 1
     return near[:count]
@@ -302,6 +315,6 @@ def common_parts(first: Array, second: Array) -> tuple[Array, Array]:
         n = clip(first[k], second[k], 0.0, 0.0, one, two)
         if n > 2:
             areas[k] = area_and_rim(one, n)[0]
-            for corner in range(6):
-                parts[k, corner] = one[min(corner, n - 1)]
+            for c in range(6):
+                parts[k, c, 0], parts[k, c, 1] = one[min(c, n - 1), 0], one[min(c, n - 1), 1]
     return areas, parts

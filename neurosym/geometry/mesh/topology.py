@@ -16,10 +16,16 @@ from neurosym.support.arrays import Array, Numbers, Truths
 MAX_OPEN_EDGES = 5_000
 
 
-def merged(vertices: Array, faces: Numbers, within: float = 0.0) -> tuple[Array, Numbers]:
-    """Vertices in one place made one, unused ones dropped; `within` a length: chains of nearer ones, too."""
+def in_use(vertices: Array, faces: Numbers) -> Truths:
+    """bool (n,): which vertices some face has for a corner."""
     used = np.zeros(len(vertices), dtype=bool)
     used[faces] = True
+    return used
+
+
+def merged(vertices: Array, faces: Numbers, within: float = 0.0) -> tuple[Array, Numbers]:
+    """Vertices in one place made one, unused ones dropped; `within` a length: chains of nearer ones, too."""
+    used = in_use(vertices, faces)
     # Adding 0 turns -0 into 0.
     vertices, faces = vertices[used] + 0.0, (np.cumsum(used) - 1)[faces]
     groups, first = alike(vertices)

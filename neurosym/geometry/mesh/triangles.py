@@ -9,7 +9,7 @@ from neurosym.geometry.mesh import distances as points_and_trees
 from neurosym.geometry.mesh import kernels
 from neurosym.geometry.mesh.connections import adjacent, alike, has_valley
 from neurosym.geometry.mesh.flats import Flats
-from neurosym.geometry.mesh.topology import signed_volume
+from neurosym.geometry.mesh.topology import in_use, signed_volume
 from neurosym.geometry.mesh.trees import along_curve
 from neurosym.support.arrays import Array, Numbers, Truths
 
@@ -33,7 +33,7 @@ def are_convex(vertices: Array, faces: Numbers, margin: float) -> bool:
     if has_valley(vertices, faces, adjacent(faces), margin):
         return False
     try:
-        hull = ConvexHull(vertices[np.unique(faces)])
+        hull = ConvexHull(vertices[in_use(vertices, faces)])
     except QhullError:
         return False
     return bool(abs(hull.volume - signed_volume(vertices, faces)) <= 2 * margin * hull.area)
@@ -51,15 +51,17 @@ def crossing_pairs(vertices: Array, faces: Numbers, margin: float) -> Numbers:
     Faces that only touch, or lie in one plane, do not cross.
     """
     body = np.zeros(len(faces), dtype=np.int64)
-    order = along_curve(vertices[faces[:, 0]], body)
-    t, vectors, middles, _ = kernels.measured(vertices, faces[order])
+    t, vectors, middles, _ = kernels.measured(vertices, faces)
     areas = np.linalg.norm(vectors, axis=1)
-    normals, first = vectors / np.maximum(areas, 1e-300)[:, None], np.array([0, len(t)])
-    # Fans and flat lids have many neighbours in their own plane.
-    flats = Flats.of(t, normals, areas, middles, body, adjacent(faces[order]), margin)
-    trees = kernels.tree_bounds(t, np.ones(len(t), dtype=bool), first)
-    labels = kernels.tree_labels(flats.of_triangle, first)
-    i, j = kernels.straddling_pairs(t, normals, *trees, labels, first, np.zeros((1, 2), dtype=np.int64), margin).T[1:]
+    normals = vectors / np.maximum(areas, 1e-300)[:, None]
+    # Fans and flat lids have many neighbours in their own plane: they come one after the other, and are left out.
+    label = Flats.of(t, normals, areas, middles, body, adjacent(faces), margin).of_triangle
+    order = np.argsort(label, kind="stable")
+    order = order[along_curve(t[order, 0], label[order])]
+    t, normals, first = t[order], normals[order], np.array([0, len(t)])
+    trees, labels = kernels.tree_bounds(t, body == 0, first), kernels.tree_labels(label[order], first)
+    one = np.zeros((1, 2), dtype=np.int64)
+    i, j = kernels.straddling_pairs(*trees, *trees, labels, t, normals, first, one, margin).T[1:]
     hit = np.zeros(len(i), dtype=bool)
     for k in range(3):
         hit |= pierced(t[i][:, [k, (k + 1) % 3]], t[j], normals[j], margin)[0]

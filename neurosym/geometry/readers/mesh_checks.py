@@ -100,9 +100,9 @@ def _can_be_measured(vertices: Array, faces: Numbers, rounding: float, found: _F
             "index", faces.max(), f"has faces that index more than its {len(vertices)} vertices", "Export it again."
         )
         return False
-    corners = vertices[np.unique(faces)]
-    bad = int((~np.isfinite(corners)).any(axis=1).sum())
-    if bad:
+    corners = vertices[topology.in_use(vertices, faces)]
+    if not np.isfinite(corners).all():
+        bad = int((~np.isfinite(corners)).any(axis=1).sum())
         found.fault("nan", bad, f"has {bad} vertices that are NaN or infinite", "Export the part again.")
         return False
     with np.errstate(over="ignore"):
@@ -124,7 +124,7 @@ def _can_be_measured(vertices: Array, faces: Numbers, rounding: float, found: _F
 def _closed(vertices: Array, faces: Numbers, found: _Findings) -> tuple[Array, Numbers]:
     """The mesh with its vertices merged, its faces of no area dropped, wound one way; faults where it is open."""
     given = len(faces)
-    extent = float(np.ptp(vertices[np.unique(faces)], axis=0).max())
+    extent = float(np.ptp(vertices[topology.in_use(vertices, faces)], axis=0).max())
     exact, joined = topology.merged(vertices, faces)
     vertices, merged = topology.merged(exact, joined, MERGE * extent)
     faces = topology.without_repeats(merged)
