@@ -14,6 +14,10 @@ from neurosym.geometry.mesh.trees import along_curve
 from neurosym.support.arrays import Array, Numbers, Truths
 
 
+#: Which of 997 faces are held against all vertices first: of most surfaces that are not convex one of them shows it.
+_SOME = np.arange(32) * 617 % 997
+
+
 def area_vectors(triangles: Array) -> Array:
     """float64 (m, 3): normals, outward, each as long as twice the area."""
     return np.asarray(np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]))
@@ -28,12 +32,16 @@ def plane_axes(normals: Array) -> tuple[Array, Array]:
 
 def are_convex(vertices: Array, faces: Numbers, margin: float) -> bool:
     """Whether no vertex (n, 3) of a closed mesh lies above the plane of any face (m, 3) by more than `margin`."""
-    faces = alike(vertices)[0][faces]
+    corners, some = vertices[in_use(vertices, faces)], vertices[faces[_SOME * len(faces) // 997]]
+    planes = unit_normals(some)
+    if (corners @ planes.T > np.einsum("md,md->m", some[:, 0], planes) + margin).any():
+        return False
     # Without a valley along any edge a surface is convex, unless it has several parts, or goes round more than once.
+    faces = alike(vertices)[0][faces]
     if has_valley(vertices, faces, adjacent(faces), margin):
         return False
     try:
-        hull = ConvexHull(vertices[in_use(vertices, faces)])
+        hull = ConvexHull(corners)
     except QhullError:
         return False
     return bool(abs(hull.volume - signed_volume(vertices, faces)) <= 2 * margin * hull.area)
