@@ -113,7 +113,8 @@ class _Pairs:
         """How deep the bodies overlap, float64 (k,); faces are compared up to a distance of `gaps` (k,)."""
         s, depth = self.exact, np.zeros(len(self.pairs))
         corners, pair, other = self._in_other(s.vertices, s.first_vertex)
-        corners, pair, other = (x[_spread(pair, MAX_MEASURED)] for x in (corners, pair, other))
+        some = _spread(pair, MAX_MEASURED)
+        corners, pair, other = corners[some], pair[some], other[some]
         away = nearest(corners, other, s.triangles, *s.trees, s.first)
         np.maximum.at(depth, pair, np.where(away > self.noise, away, 0.0))
         dense = gaps == gaps.min()
@@ -150,9 +151,12 @@ class _Pairs:
         s, flats, (small, flat) = self.exact, self.surfaces.flats, self.surfaces.split_trees
         # Large flat faces in one plane do not go through one another, however many triangles they have.
         planes = kernels.tree_labels(flats.planes(self.noise / 2)[flats.of_triangle], s.first)
-        none, rest = np.full(len(planes), -1), (s.triangles, s.normals, s.first, self.pairs, self.noise / 2)
+        none = np.full(len(planes), -1)
         passes = ((small, s.trees, none), (flat, small, none), (flat, flat, planes))
-        crossing = [kernels.straddling_pairs(*one, *two, labels, *rest) for one, two, labels in passes]
+        crossing = [
+            kernels.straddling_pairs(*one, *two, labels, s.triangles, s.normals, s.first, self.pairs, self.noise / 2)
+            for one, two, labels in passes
+        ]
         pair, i, j = np.concatenate(crossing).T
         found: list[Points] = [(np.zeros((0, 3)), pair[:0])]
         for one, other in ((i, j), (j, i)):

@@ -154,7 +154,8 @@ def _plus(a: Vector, share: float, u: Vector) -> Vector:
 
 @inlined
 def _dot(a: Vector, b: Vector) -> float:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    product: float = a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    return product
 
 
 @inlined

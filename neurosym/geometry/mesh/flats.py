@@ -91,7 +91,7 @@ class Flats:
         facing &= np.linalg.norm(np.cross(self.normals[i], self.normals[j]), axis=1) <= sine
         number = {(a, b): k for k, (a, b) in enumerate(pairs.tolist())}
         of_pair = np.array([number.get(p, -1) for p in zip(self.body[i].tolist(), self.body[j].tolist())], dtype=int)
-        return np.stack([of_pair, i, j], axis=1)[facing & (of_pair >= 0)]
+        return np.asarray(np.stack([of_pair, i, j], axis=1)[facing & (of_pair >= 0)])
 
     def planes(self, within: float) -> Numbers:
         """int64 (n + 1,): faces in one plane, to `within` (length), bear one number; -1 at the end is of no face."""

@@ -13,7 +13,6 @@ from neurosym.geometry.mesh.topology import in_use, signed_volume
 from neurosym.geometry.mesh.trees import along_curve
 from neurosym.support.arrays import Array, Numbers, Truths
 
-
 #: Which of 997 faces are held against all vertices first: of most surfaces that are not convex one of them shows it.
 _SOME = np.arange(32) * 617 % 997
 
@@ -74,7 +73,7 @@ def crossing_pairs(vertices: Array, faces: Numbers, margin: float) -> Numbers:
     for k in range(3):
         hit |= pierced(t[i][:, [k, (k + 1) % 3]], t[j], normals[j], margin)[0]
         hit |= pierced(t[j][:, [k, (k + 1) % 3]], t[i], normals[i], margin)[0]
-    return order[np.stack([i[hit], j[hit]], axis=1)]
+    return np.asarray(order[np.stack([i[hit], j[hit]], axis=1)])
 
 
 def pierced(
