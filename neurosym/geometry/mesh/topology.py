@@ -132,7 +132,7 @@ def closed_shells(faces: Numbers) -> Numbers | None:
 def closed_runs(faces: Numbers) -> Numbers:
     """int64 (m,): the number of the run that each face belongs to: faces in their order, until their edges close."""
     edge = half_edges(faces)[1]
-    face = np.arange(len(edge)) % len(faces)
+    face = np.arange(len(edge)) // 3
     order = np.lexsort((face, edge))
     place = np.arange(len(edge)) - np.searchsorted(edge[order], edge[order])
     # The first face along an edge leaves it open, the second closes it, a third opens it again.
