@@ -12,8 +12,10 @@ from structures import CASES, Case, assembly, between_walls, box, card_house, ha
 
 import neurosym as ns
 from neurosym.geometry.assembly import NO_TABLE
+from neurosym.geometry.contact.contacts import Contact
 from neurosym.geometry.queries import AssemblyGeometry
 from neurosym.geometry.shapes import Body, Box, Part
+from neurosym.geometry.stability.contact_springs import contact_springs
 from neurosym.geometry.stability.settling import settle
 from neurosym.geometry.stability.spring_loads import drag, margin, standing_while_pulled
 from neurosym.geometry.stability.spring_stability import DOWN, SpringStability
@@ -144,6 +146,17 @@ def test_a_patch_in_two_halves_is_one():
         assert stands(one) is stands(many)
         a, b = spring_stability(one).settled(0b11), spring_stability(many).settled(0b11)
         np.testing.assert_allclose(a.share.max(), b.share.max(), rtol=1e-6)
+
+
+def test_a_corner_told_twice_is_one():
+    corners = np.array([[0.0, 0, 1], [1, 0, 1], [1, 2, 1], [0, 2, 1]])
+    up = np.array([0.0, 0, 1])
+    for twice in range(4):
+        points = np.insert(corners, twice, corners[twice], axis=0)
+        patch = Contact(0, 1, points, up, 2.0)
+        springs = contact_springs([patch], np.ones(2), np.array([[0.5, 1, 0.5], [0.5, 1, 1.5]]), friction=0.5)
+        for corner in corners:
+            assert springs.across[(springs.at == corner).all(axis=1)].sum() == pytest.approx(0.25)
 
 
 def test_tiny_parts_do_not_float():

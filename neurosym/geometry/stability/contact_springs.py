@@ -23,8 +23,8 @@ def contact_springs(
 ) -> Springs:
     """The springs of parts with these masses (n,) and centres (n, 3) that touch in these patches.
 
-    A patch's stiffness is its area. Its corners share it by the area of the patch about each, so that a corner that
-    is told twice, or a needless one on an edge, changes nothing.
+    A patch's stiffness is its area. Its corners share it by the area of the patch about each: two that nearly coincide
+    count as one.
 
     Args:
         patches: between parts `a` and `b`, or the table; see `merged_patches`.

@@ -67,21 +67,20 @@ def settle(
     if slippery is not None:
         friction[slippery] = 0.0
     bound = np.where(friction > 0, np.abs(system.load).sum() + system.weights.sum(), 0.0)
-    anchor, mixing = np.zeros((k, 2)), _Mixing(numbers.damping)
+    mixing = _Mixing(numbers.damping)
     u, d = np.zeros((m, 6)), np.zeros((k, 3))
     fell, rounds = 0, 0
     for rounds in range(_ROUNDS):
-        u, d, forces, done = system.newton(u, d, bound, anchor, _LEFT_STANDING, _STEPS)
+        u, d, forces, done = system.newton(u, d, bound, _LEFT_STANDING, _STEPS)
         if system.share(u).max(initial=0.0) > numbers.falls:
-            u, d, forces, done = system.newton(u, d, bound, anchor, _LEFT_FALLING, _MOST_STEPS)
+            u, d, forces, done = system.newton(u, d, bound, _LEFT_FALLING, _MOST_STEPS)
         share = system.share(u)
         falls = bool(share.max(initial=0.0) > numbers.falls)
         fell = fell + 1 if falls else 0
-        limit = system.coulomb(d, forces, friction)
+        limit = friction * forces[:, 0]
         if fell >= numbers.patience or (not falls and done and system.agrees(forces, bound, limit)):
             break
         bound = np.minimum(bound, limit) if rounds == 0 else mixing.next(bound, limit)
-        anchor = system.anchors(d)
     share = system.share(u)
     stands = bool(share.max(initial=0.0) <= numbers.falls)
     return Settled(stands, system.parts, corners, u, share, forces, rounds + 1, system.factorisations)
@@ -140,18 +139,6 @@ class _System:
         """float64 (m,): the share of each part's weight that the ground carries."""
         return np.asarray(self.eps * np.abs(u).max(axis=1, initial=0.0))
 
-    def coulomb(self, d: Array, forces: Array, friction: Array) -> Array:
-        """float64 (k,): mu N. A pressure that comes of rounding, as something slides along a wall, is none."""
-        rounding = _ROUNDING * self.across * np.hypot(d[:, 1], d[:, 2])
-        return np.asarray(friction * np.maximum(forces[:, 0] - rounding, 0.0))
-
-    def anchors(self, d: Array) -> Array:
-        """float64 (k, 2): where each tangential spring began: where its gap closed, on a straight way."""
-        if not self.gap.any():
-            return np.zeros((len(d), 2))
-        pressed = np.maximum(-d[:, 0] - self.gap, 0.0)
-        return np.asarray(d[:, 1:] * (self.gap / np.maximum(self.gap + pressed, 1e-300))[:, None])
-
     def agrees(self, forces: Array, bound: Array, limit: Array) -> bool:
         """Whether friction is as Coulomb's law has it: no more than mu N, and as much where it slips."""
         rubbing = np.hypot(forces[:, 1], forces[:, 2])
@@ -164,11 +151,9 @@ class _System:
         scale = np.maximum(self.weights, self.agreement * pressed[:-1])
         return bool((total[:-1] <= self.agreement * scale).all())
 
-    def newton(
-        self, u: Array, d: Array, bound: Array, anchor: Array, left: float, most: int
-    ) -> tuple[Array, Array, Array, bool]:
+    def newton(self, u: Array, d: Array, bound: Array, left: float, most: int) -> tuple[Array, Array, Array, bool]:
         """Displacements u (m, 6) and d (k, 3) of least energy, the forces (k, 3), and whether they are found."""
-        spring = (anchor, bound, self.across, self.along, self.gap)
+        spring = (bound, self.across, self.along, self.gap)
         ends = (self.Ja, self.Jb, self.pa, self.pb)
         m = len(u)
         for step in range(most + 1):

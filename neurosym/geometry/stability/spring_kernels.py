@@ -30,14 +30,14 @@ def opened(Ja: Array, Jb: Array, a: Numbers, b: Numbers, u: Array) -> Array:
 
 
 @compiled
-def pushed(d: Array, anchor: Array, bound: Array, kn: Array, kt: Array, gap: Array) -> Array:
+def pushed(d: Array, bound: Array, kn: Array, kt: Array, gap: Array) -> Array:
     """float64 (c, 3): the forces on a's side, along (normal, tangent, tangent)."""
     f = np.zeros((len(d), 3))
     for c in range(len(d)):
         x = -d[c, 0] - gap[c]
         if x > 0:
             f[c, 0] = kn[c] * x
-        p, q = d[c, 1] - anchor[c, 0], d[c, 2] - anchor[c, 1]
+        p, q = d[c, 1], d[c, 2]
         e = np.sqrt(p * p + q * q)
         k = kt[c] if kt[c] * e < bound[c] else bound[c] / e if e > 0 else 0.0
         f[c, 1], f[c, 2] = -k * p, -k * q
@@ -80,7 +80,6 @@ def fill(
     band: Array,
     ground: Array,
     d: Array,
-    anchor: Array,
     bound: Array,
     kn: Array,
     kt: Array,
@@ -98,7 +97,7 @@ def fill(
     K = np.zeros((3, 3))
     for c in range(len(d)):
         K[0, 0] = kn[c] if -d[c, 0] - gap[c] >= 0 else 0.0
-        p, q = d[c, 1] - anchor[c, 0], d[c, 2] - anchor[c, 1]
+        p, q = d[c, 1], d[c, 2]
         e = np.sqrt(p * p + q * q)
         if kt[c] * e < bound[c]:
             K[1, 1] = K[2, 2] = kt[c]
@@ -121,9 +120,7 @@ def fill(
 
 
 @compiled
-def slope(
-    share: float, d: Array, change: Array, anchor: Array, bound: Array, kn: Array, kt: Array, gap: Array
-) -> tuple[float, float]:
+def slope(share: float, d: Array, change: Array, bound: Array, kn: Array, kt: Array, gap: Array) -> tuple[float, float]:
     """The first and second derivative of the springs' energy along `d + share * change`."""
     first, second = 0.0, 0.0
     for c in range(len(d)):
@@ -132,7 +129,7 @@ def slope(
             first -= kn[c] * x * change[c, 0]
             second += kn[c] * change[c, 0] ** 2
         v, w = change[c, 1], change[c, 2]
-        p, q = d[c, 1] + share * v - anchor[c, 0], d[c, 2] + share * w - anchor[c, 1]
+        p, q = d[c, 1] + share * v, d[c, 2] + share * w
         e = np.sqrt(p * p + q * q)
         if kt[c] * e < bound[c]:
             first += kt[c] * (p * v + q * w)
