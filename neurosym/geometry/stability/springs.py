@@ -24,9 +24,9 @@ from neurosym.support.arrays import Array, Numbers, Truths
 class SpringNumbers:
     """The numbers of the model, chosen by experiment.
 
-    On 400 random subsets of Soma cubes, 126 questions about arches, walls, a vault, a dome and pyramids, and 51 cases by
-    hand, halving or doubling any of them changes two verdicts: of one subset that PyBullet lets fall and MuJoCo does not,
-    and of one state of the vault.
+    On 400 random subsets of Soma cubes, 126 questions about arches, walls, a vault, a dome and pyramids, and 51 cases
+    by hand, halving or doubling any of them changes two verdicts: of one subset that PyBullet lets fall and MuJoCo
+    does not, and of one state of the vault.
 
     Attributes:
         tangential: stiffness along a contact, as a share of that across it. It decides which contacts rub first.
