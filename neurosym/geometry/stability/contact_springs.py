@@ -31,6 +31,8 @@ def contact_springs(
         friction: Coulomb's coefficient.
         gaps: float64 (len(patches),): how far the faces of each are apart (length); None: they touch.
     """
+    wide = [k for k, p in enumerate(patches) if len(p.points) > 2]  # the hull of merged slivers may be none
+    patches, gaps = [patches[k] for k in wide], None if gaps is None else gaps[wide]
     counts = np.array([len(p.points) for p in patches], dtype=np.int64)
     patch, place = spans(counts)
     a = np.array([p.a for p in patches], dtype=np.int64)[patch]
@@ -68,8 +70,10 @@ def _shares(at: Array, following: Numbers, normals: Array, patch: Numbers) -> Ar
     if not len(at):
         return np.zeros(0)
     starts = np.flatnonzero(np.diff(patch, prepend=-1))
-    middles = np.add.reduceat(at, starts) / np.bincount(patch)[:, None]
-    arms = at - middles[patch]
+    first = at[starts][patch]
+    fan = np.einsum("cd,cd->c", np.cross(at - first, at[following] - first), normals)
+    moments = np.add.reduceat(fan[:, None] * (first + at + at[following]) / 3, starts)
+    arms = at - (moments / np.add.reduceat(fan, starts)[:, None])[patch]  # from the middle of the area
     triangles = np.abs(np.einsum("cd,cd->c", np.cross(arms, arms[following]), normals))
     shares = triangles.copy()
     shares[following] += triangles
