@@ -16,7 +16,7 @@ from learned_priors.recipes import Recipe, recipe_named
 from learned_priors.train_config import TrainConfig
 from learned_priors.trained_network import TrainedNetwork
 from learned_priors.training import FitProgress, fit
-from learned_priors.weight_store import WeightStore
+from learned_priors.weight_files import WeightStore
 from neurosym.errors import InputError
 from neurosym.language.demonstrations import Demonstrations
 from neurosym.planning.order_scores import OrderScores

@@ -15,7 +15,7 @@ from neurosym.errors import InputError, UnknownNameError
 from neurosym.language.search_problem import Rejection
 from neurosym.planning.planner import PlannerTraits
 from neurosym.planning.result import PlanResult, Status
-from planners.assignment import RESOLUTION, AssignmentHeuristic
+from planners.assignment_heuristic import RESOLUTION, AssignmentHeuristic
 from planners.node import Node
 from planners.priorities import PartialPlan, Priority, astar, greedy, levin, weighted
 from planners.search_context import BudgetSpent, SearchContext

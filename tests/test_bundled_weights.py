@@ -7,7 +7,7 @@ import pytest
 
 import neurosym as ns
 from learned_priors.network_prior import NetworkPrior
-from learned_priors.weight_store import FOLDER
+from learned_priors.weight_files import FOLDER
 from neurosym.errors import InputError
 from neurosym.planning.weights_header import read_header
 from neurosym.testing import check_prior

@@ -21,7 +21,7 @@ from learned_priors.heads import TemporalDecoder, dilations
 from learned_priors.network_prior import NetworkPrior
 from learned_priors.networks import NetworkConfig, OrderNetwork
 from learned_priors.recipes import RECIPES
-from learned_priors.weight_store import FOLDER
+from learned_priors.weight_files import FOLDER
 from neurosym.errors import CheckpointError, ContractError, InputError, UnknownNameError
 from neurosym.language.demonstrations import Demonstrations
 from neurosym.planning.order_scores import OrderScores
@@ -283,7 +283,7 @@ def folder(file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (tmp_path / "toys-sinkhorn.safetensors").write_bytes(file.read_bytes())
     larger = replace(random_demonstrations(side=16, domain="big"), actions=("one", "two", "three", "four"))
     NetworkPrior("sinkhorn").fit(larger, epochs=1).save(tmp_path / "big-sinkhorn.safetensors")
-    monkeypatch.setattr("learned_priors.weight_store.FOLDER", tmp_path)
+    monkeypatch.setattr("learned_priors.weight_files.FOLDER", tmp_path)
     return tmp_path
 
 

@@ -12,7 +12,7 @@ from neurosym.planning.order_scores import OrderScores
 from neurosym.planning.result import Status
 from neurosym.testing.toys import Counting, NumberLine, Removal, Table, Tiles
 from planners import Backtracking, BestFirst, Exhaustive, SwapRepair, count_plans, order_marginals
-from planners.assignment import AssignmentHeuristic
+from planners.assignment_heuristic import AssignmentHeuristic
 from planners.node import Node
 from planners.search_context import SearchContext
 

@@ -12,7 +12,7 @@ from neurosym.planning.order_scores import OrderScores
 from neurosym.planning.result import Status
 from neurosym.testing.toys import Counting, NumberLine, Removal, Tiles, brute_force_plans
 from planners import Backtracking, BestFirst, Exhaustive, all_plans, count_plans, order_marginals
-from planners.assignment import AssignmentHeuristic
+from planners.assignment_heuristic import AssignmentHeuristic
 
 removals = st.builds(
     Removal.random,
