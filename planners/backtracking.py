@@ -21,9 +21,9 @@ class Backtracking(SearchPlanner):
     """Depth-first search that keeps the verified prefix, learns from every rejection, and leaves only dead states.
 
     With scores, the next action is the first of the cheapest completion (`planners.assignment_heuristic`) that is not
-    known to be refused; a completion is kept for as long as the search keeps to it, so a good prior costs one assignment.
-    Among equals, and without scores: what rejections named last, then the rng. A state with the set of used actions
-    that was found dead is never entered again.
+    known to be refused; a completion is kept for as long as the search keeps to it, so a good prior costs one
+    assignment. Among equals, and without scores: what rejections named last, then the rng. A state with the set of
+    used actions that was found dead is never entered again.
     """
 
     traits = PlannerTraits(complete=True)
