@@ -19,6 +19,16 @@ DIRECTIONS = np.array([[0, 0, 1.0], [1, 0, 0], [0, 1, 0], [0, 0, -1.0], [-1, 0, 
 Meshes = dict[str, trimesh.Trimesh]
 
 
+def _ball(k: int) -> np.ndarray:
+    """Where the ball number k of a row is, float64 (2,)."""
+    return 13.1 * np.array([np.cos(np.pi / 8 * k), np.sin(np.pi / 8 * k)])
+
+
+def _aside(apart: np.ndarray, along: np.ndarray) -> float:
+    """How far a point of the plane is from the line along a unit vector."""
+    return abs(float(apart[0] * along[1] - apart[1] * along[0]))
+
+
 def washers(sections: int = 512) -> Meshes:
     """Three washers, one on another."""
     meshes = {}
@@ -36,8 +46,8 @@ def bearing(subdivisions: int = 3, sections: int = 256) -> Meshes:
     meshes["housing"] = extruded(outer.difference(bore), -15, 15)
     for row, k in itertools.product(range(2), range(16)):
         ball = trimesh.creation.icosphere(subdivisions=subdivisions, radius=2.5)
-        at = 13.1 * np.array([np.cos(np.pi / 8 * k), np.sin(np.pi / 8 * k)])
-        meshes[f"ball{16 * row + k}"] = ball.apply_translation((*at, -8 + 16 * row))
+
+        meshes[f"ball{16 * row + k}"] = ball.apply_translation((*_ball(k), -8 + 16 * row))
     return meshes
 
 
@@ -119,11 +129,72 @@ def extruded(plan: shapely.Polygon, low: float, high: float, layers: int = 1) ->
     return trimesh.Trimesh(soup.reshape(-1, 3), np.arange(3 * len(soup)).reshape(-1, 3), process=True)
 
 
+#: What blocks what: (mover, number of the direction, obstacle).
+Blocked = set[tuple[str, int, str]]
+
+
+def blocked_washers() -> Blocked:
+    """Up and down alone: faces that touch do not block along themselves."""
+    return _both_ways({(low, 0, high) for low, high in itertools.combinations("abc", 2)})
+
+
+def blocked_bearing() -> Blocked:
+    """Balls, a shaft and a bore as what they are cut from: no pair comes near the edge of blocking."""
+    balls = {f"ball{16 * row + k}": (_ball(k), row) for row in range(2) for k in range(16)}
+    blocked = {("shaft", d, "housing") for d in (1, 2, 4, 5)} | {("housing", d, "shaft") for d in (1, 2, 4, 5)}
+    for name, (at, row) in balls.items():
+        if row == 0:
+            blocked.add((name, 0, f"ball{int(name[4:]) + 16}"))
+        for d in (1, 2, 4, 5):
+            along = DIRECTIONS[d][:2]
+            blocked |= {(name, d, "housing"), ("housing", d, name)}
+            if at @ along < 0 and _aside(at, along) < 10 + 2.5:
+                blocked |= {(name, d, "shaft")}
+            for other, (there, level) in balls.items():
+                apart = there - at
+                if level == row and apart @ along > 0 and _aside(apart, along) < 5:
+                    blocked.add((name, d, other))
+    return _both_ways(blocked)
+
+
+def blocked_plates() -> Blocked:
+    """Heads are above the upper plate, shanks in the holes of both; bolts stand in line along x and along y."""
+    bolts = {f"bolt{k}": (k // 2, k % 2) for k in range(8)}
+    blocked = {("lower", 0, "upper"), *((plate, 0, bolt) for plate in ("lower", "upper") for bolt in bolts)}
+    for bolt, (column, row) in bolts.items():
+        blocked |= {(bolt, d, plate) for plate in ("lower", "upper") for d in (1, 2, 4, 5)}
+        for other, (there, beside) in bolts.items():
+            blocked |= {(bolt, 1, other)} if beside == row and there > column else set()
+            blocked |= {(bolt, 2, other)} if there == column and beside > row else set()
+    return _both_ways(blocked)
+
+
+def blocked_gears() -> Blocked:
+    """All stands on the base; each gear is held sideways by its pin, and by the other gear but away from it."""
+    blocked = {("base", 0, other) for other in ("gear", "pinion", "pin0", "pin1")}
+    for gear, pin in (("gear", "pin0"), ("pinion", "pin1")):
+        blocked |= {(gear, d, pin) for d in (1, 2, 4, 5)}
+    blocked |= {("gear", d, "pinion") for d in (1, 2, 5)}
+    blocked |= {("gear", 1, "pin1"), ("pin0", 1, "pinion"), ("pin0", 1, "pin1")}
+    return _both_ways(blocked)
+
+
+def _both_ways(blocked: Blocked) -> Blocked:
+    """What is hit one way hits the other way."""
+    return blocked | {(other, (d + 3) % 6, mover) for mover, d, other in blocked}
+
+
 SHAPES: dict[str, Callable[[], Meshes]] = {
     "washers": washers,
     "bearing": bearing,
     "plates": plates,
     "gears": gears,
+}
+BLOCKED: dict[str, Callable[[], Blocked]] = {
+    "washers": blocked_washers,
+    "bearing": blocked_bearing,
+    "plates": blocked_plates,
+    "gears": blocked_gears,
 }
 
 
