@@ -1,29 +1,54 @@
 """Loops that numba compiles when they are first called, and keeps on disk: beside the source, else in the user's cache.
 
-Numba looks for changes only in the file of the function that is called: compiled functions that call one another belong
-into one file.
+Importing them loads no numba. It looks for changes only in the file of the function that is called: compiled functions
+that call one another belong into one file.
 """
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
-from typing import TypeVar
+from typing import Any, TypeVar, cast
 
-from numba import njit
+F = TypeVar("F", bound=Callable[..., Any])
 
-F = TypeVar("F", bound=Callable[..., object])
+#: Functions of one file, by the file's names; whether each is kept on disk by itself.
+_waiting: dict[int, list[tuple[Callable[..., Any], bool]]] = {}
+_ready: dict[Callable[..., Any], Callable[..., Any]] = {}
 
 
 def compiled(function: F) -> F:
     """The function as machine code, once it is called; division by zero gives infinity, as in numpy."""
-    try:
-        fast: F = njit(function, cache=True, nogil=True, error_model="numpy")
-    except RuntimeError:  # neither place can be written: it is compiled anew in each process
-        fast = inlined(function)
-    return fast
+    return _later(function, True)
 
 
 def inlined(function: F) -> F:
-    """The same for generators: numba 0.68 cannot load one from disk, but it keeps them with what calls them."""
-    fast: F = njit(function, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
-    return fast
+    """The same for what only other compiled functions call, generators among them: it is kept on disk with those."""
+    return _later(function, False)
+
+
+def _later(function: F, kept: bool) -> F:
+    file = id(function.__globals__)
+    _waiting.setdefault(file, []).append((function, kept))
+
+    @functools.wraps(function)
+    def call(*given: Any) -> Any:
+        if function not in _ready:
+            for each, alone in _waiting.pop(file):
+                # In place of what waits: compiled functions look for one another there.
+                _ready[each] = each.__globals__[each.__name__] = _made(each, alone)
+        return _ready[function](*given)
+
+    return cast(F, call)
+
+
+def _made(function: Callable[..., Any], kept: bool) -> Callable[..., Any]:
+    from numba import njit
+
+    options: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
+    if not kept:
+        return cast(Callable[..., Any], njit(function, **options, no_cpython_wrapper=True, no_cfunc_wrapper=True))
+    try:
+        return cast(Callable[..., Any], njit(function, **options, cache=True))
+    except RuntimeError:  # neither place can be written: compiled anew in each process
+        return cast(Callable[..., Any], njit(function, **options))

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial import ConvexHull
 
 from neurosym.geometry.assembly import Assembly
-from neurosym.geometry.contact.surfaces import Surfaces
+from neurosym.geometry.contact.surfaces import BodySurfaces, Surfaces
 from neurosym.geometry.mesh.broad_phase import overlapping_pairs
 from neurosym.support.arrays import Array, Numbers
 from neurosym.support.compiled import compiled
@@ -47,13 +47,15 @@ class MatingOverlaps:
         return apart
 
 
-def mating_overlaps(assembly: Assembly, surfaces: Surfaces) -> MatingOverlaps:
+def mating_overlaps(assembly: Assembly, surfaces: BodySurfaces) -> MatingOverlaps:
     """The facet of either hull that is overlapped least shows the shortest way apart (up to edges against edges)."""
     bounds, half = assembly.body_bounds, min(assembly.touch, OVERLAP * assembly.smallest_extent) / 2
     near = overlapping_pairs(bounds[:, 0] + half, bounds[:, 1] - half, assembly.owners)
+    if not len(near):
+        return MatingOverlaps(near, np.zeros((0, 3)), len(assembly.bodies))
     count = len(assembly.bodies)
     bodies, place = np.unique(near, return_inverse=True)
-    hulls = [_hull(assembly, surfaces, int(b)) for b in bodies]
+    hulls = [_hull(assembly, surfaces.exact, int(b)) for b in bodies]
     planes, corners = (np.concatenate([np.zeros((0, k)), *(h[i] for h in hulls)]) for i, k in ((0, 4), (1, 3)))
     first = [np.concatenate([[0], np.cumsum([len(h[i]) for h in hulls], dtype=np.int64)]) for i in (0, 1)]
     pairs = place.reshape(-1, 2).astype(np.int64)

@@ -13,6 +13,7 @@ import shapely
 
 from neurosym.geometry.contact.surfaces import GRID, Surfaces
 from neurosym.geometry.mesh import kernels
+from neurosym.geometry.mesh.broad_phase import MOST, near_pairs
 from neurosym.support.arrays import Array, Numbers, Truths
 
 #: So many narrow pieces of an overlap are put together before the rest of them are looked for.
@@ -54,11 +55,25 @@ class Shadows:
             )
             wide = answers == 1
             # Slivers side by side may be wide together: surfaces cut into narrow facets.
-            of_pair, patches = pieces[:, 0].astype(np.int64), shapely.polygons(pieces[:, 1:].reshape(-1, 8, 2))
-            area = np.bincount(of_pair, shapely.area(patches), len(asked))
-            for k in np.flatnonzero(area > self.touch**2):
-                together = shapely.union_all(patches[of_pair == k], grid_size=GRID * self.touch)
-                wide[k] = not together.buffer(-self.touch / 2).is_empty
+            of_pair, corners = pieces[:, 0].astype(np.int64), pieces[:, 1:].reshape(-1, 8, 2)
+            for k in np.unique(of_pair):
+                wide[k] = _are_wide(corners[of_pair == k], self.touch)
             hit[asked] = wide
             asked, most = asked[(answers == 2) & ~wide], np.iinfo(np.int64).max
         return hit
+
+
+def _are_wide(pieces: Array, touch: float) -> bool:
+    """Whether convex polygons, corners (n, 8, 2), hold a disc of diameter `touch` together."""
+    low, high = pieces.min(axis=1), pieces.max(axis=1)
+    x, y = np.moveaxis(pieces - pieces[:, :1], 2, 0)
+    area = np.abs((x[:, :-1] * y[:, 1:] - y[:, :-1] * x[:, 1:]).sum(axis=1)) / 2
+    # A disc is covered by pieces that come near one another; no piece covers more of it than a stripe of its width.
+    width = 2 * area / np.maximum((high - low).max(axis=1), 1e-300)
+    near = near_pairs((low - touch, high + touch), (low, high), MOST)
+    if near is not None:
+        one, other = near.T
+        crowded = np.bincount(one, width[other], len(pieces)) >= np.pi / 4 * touch
+        pieces = pieces[np.unique(other[crowded[one]])]
+    together = shapely.union_all(shapely.polygons(pieces), grid_size=GRID * touch)
+    return not together.buffer(-touch / 2).is_empty

@@ -20,7 +20,7 @@ import numpy as np
 from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.blocking.mating_overlaps import MatingOverlaps, mating_overlaps
 from neurosym.geometry.blocking.shadows import Shadows
-from neurosym.geometry.contact.surfaces import BodySurfaces, Surfaces
+from neurosym.geometry.contact.surfaces import BodySurfaces
 from neurosym.geometry.mesh.broad_phase import overlapping_pairs
 from neurosym.geometry.mesh.triangles import plane_axes
 from neurosym.support.arrays import Array, Numbers, Truths
@@ -50,24 +50,20 @@ class Sweeps:
     """The bodies of an assembly moved along directions, given as unit vectors (3,)."""
 
     def __init__(self, assembly: Assembly, surfaces: BodySurfaces) -> None:
-        self.assembly, self._bodies = assembly, surfaces
+        self.assembly, self.surfaces = assembly, surfaces
         self._shadows: dict[tuple[float, ...], Shadows] = {}
-
-    @property
-    def surfaces(self) -> Surfaces:
-        """The bodies' surfaces."""
-        return self._bodies.exact
 
     @cached_property
     def mating(self) -> MatingOverlaps:
-        """Numbers that overlap a little where they mate."""
+        """Pairs that overlap a little where they mate."""
         return mating_overlaps(self.assembly, self.surfaces)
 
     def along(self, direction: Array) -> Hits:
         """All pairs of bodies of different parts."""
         touch, frame = self.assembly.touch, sweep_frame(self.assembly, direction)
-        points, starts = self.surfaces.vertices @ frame, self.surfaces.first_vertex[:-1]
-        low, high = np.minimum.reduceat(points, starts), np.maximum.reduceat(points, starts)
+        points, first = self.surfaces.vertices
+        points = points @ frame
+        low, high = np.minimum.reduceat(points, first[:-1]), np.maximum.reduceat(points, first[:-1])
         pairs = overlapping_pairs(low[:, :2] + touch / 2, high[:, :2] - touch / 2, self.assembly.owners)
         # Both ways round: the first of a pair is what moves.
         pairs = np.concatenate([pairs, pairs[:, ::-1]])
@@ -79,7 +75,7 @@ class Sweeps:
         pairs, apart = pairs[ahead], apart[ahead]
         hit = _aligned(self.assembly, frame)[pairs].all(axis=1)
         if not hit.all():
-            hit[~hit] = Shadows(self.surfaces, frame, touch).hit(pairs[~hit], apart[~hit])
+            hit[~hit] = Shadows(self.surfaces.exact, frame, touch).hit(pairs[~hit], apart[~hit])
         return Hits(pairs[hit], len(pairs))
 
     def triangles_hit(self, pairs: Numbers, direction: Array) -> Truths:
@@ -91,7 +87,7 @@ class Sweeps:
         if key not in self._shadows:
             if len(self._shadows) == _KEPT:
                 self._shadows.clear()
-            self._shadows[key] = Shadows(self.surfaces, frame, self.assembly.touch)
+            self._shadows[key] = Shadows(self.surfaces.exact, frame, self.assembly.touch)
         return self._shadows[key].hit(pairs, self.mating.apart(pairs) @ frame)
 
 

@@ -51,12 +51,13 @@ def find_contacts(assembly: Assembly, surfaces: BodySurfaces) -> tuple[Contact, 
     contacts = _box_contacts(assembly, near[aligned])
     others = near[~aligned]
     if len(others):
-        tolerances, lengths = assembly.tolerances, {"touch": touch, "mate": assembly.mate}
-        patches = facet_patches(surfaces, others, sine=tolerances.parallel, gap=touch, **lengths)
+        round_sine = assembly.tolerances.mate_angle
+        sizes = {"round_sine": round_sine, "touch": touch, "mate": assembly.mate}
+        patches = facet_patches(surfaces, others, sine=assembly.tolerances.parallel, gap=touch, **sizes)
         known = {patch[:2] for patch in patches}
         left = np.array([pair for pair in others.tolist() if tuple(pair) not in known], dtype=np.int64).reshape(-1, 2)
         rounded = left[surfaces.exact.gaps(left, enough=touch, far=2 * touch) <= touch]
-        patches += facet_patches(surfaces, rounded, sine=tolerances.mate_angle, gap=assembly.mate, **lengths)
+        patches += facet_patches(surfaces, rounded, sine=round_sine, gap=assembly.mate, **sizes)
         contacts += [Contact(*patch) for patch in patches]
     return tuple(_table_contacts(assembly) + sorted(contacts, key=lambda c: (c.a, c.b)))
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 
-from neurosym.geometry.contact.planes import is_wide, polygon_area
+from neurosym.geometry.contact.planes import is_wide
 from neurosym.geometry.contact.surfaces import GRID, BodySurfaces
 from neurosym.geometry.mesh import kernels
 from neurosym.geometry.mesh.triangles import plane_axes
@@ -14,14 +15,18 @@ from neurosym.support.arrays import Array, Numbers
 #: Bodies a and b, corners (k, 3), normal (3,) from a to b, area, gap: see `neurosym.geometry.contact.contacts.Contact`.
 Patch = tuple[int, int, Array, Array, float, float]
 
+#: Two bodies that touch in more planes than this touch with round surfaces.
+_MANY = 32
+
 
 def facet_patches(
-    surfaces: BodySurfaces, pairs: Numbers, *, sine: float, gap: float, touch: float, mate: float
+    surfaces: BodySurfaces, pairs: Numbers, *, sine: float, round_sine: float, gap: float, touch: float, mate: float
 ) -> list[Patch]:
     """Patches in which bodies touch, all pairs (k, 2) at once; those of one pair in one plane are one.
 
     Args:
         sine: of the angle up to which normals count as opposite.
+        round_sine: of the angle between normals up to which facets of round surfaces are taken for one face.
         gap: how far apart (length) the faces may be.
         touch: how wide a patch is at least (length).
         mate: how deep (length) the faces may overlap.
@@ -30,13 +35,13 @@ def facet_patches(
     # A flat face of many triangles has a number beyond theirs: two such are clipped as polygons.
     m = len(exact.triangles)
     normals, middles = (np.concatenate(x) for x in ((exact.normals, flats.normals), (exact.middles, flats.middles)))
-    within = np.full(len(pairs), 2 * gap)
+    gaps = np.full(len(pairs), 2 * gap)
     near = [
-        kernels.facing_pairs(*one, *two, exact.normals, exact.first, pairs, within, sine)
+        kernels.facing_pairs(*one, *two, exact.normals, exact.first, pairs, gaps, sine)
         for one, two in ((small, exact.trees), (flat, small))
     ]
     of_pair, i, j = np.concatenate([*near, np.add(flats.facing(pairs, 2 * gap, sine), (0, m, m))]).T
-    planes = _planes(of_pair, normals[i], middles[i], max(sine, 1e-3), 2 * mate)
+    planes = _planes(of_pair, normals[i], middles[i], max(sine, 1e-3), round_sine, 2 * mate)
     if not planes:
         return []
     number = np.repeat(np.arange(len(planes)), [len(members) for members in planes])
@@ -49,8 +54,8 @@ def facet_patches(
 
     few = np.flatnonzero(i < m)
     seen = [(exact.triangles[x[few]] - origins[number[few], None]) @ axes[number[few]] for x in (i, j)]
-    areas, corners = kernels.common_parts(*seen)
-    row, uv = np.repeat(few, corners.shape[1]), corners.reshape(-1, 2)
+    areas, corners, counts = kernels.common_parts(*seen)
+    row, uv = np.repeat(few, counts), corners[np.arange(corners.shape[1]) < counts[:, None]]
     many = np.flatnonzero(i >= m)
     if len(many):
         # On a grid: with floating numbers GEOS may take two neighbours that share an edge for one and the same.
@@ -73,34 +78,49 @@ def facet_patches(
     area[(apart > gap) | (apart < -mate)] = 0.0
     kept = area[row] > 0
     total = np.bincount(number, area, len(planes))
-    gaps = np.bincount(number, area * np.maximum(apart, 0.0), len(planes)) / np.maximum(total, 1e-300)
+    apart = np.bincount(number, area * np.maximum(apart, 0.0), len(planes)) / np.maximum(total, 1e-300)
+    plane, hulls = _hulls(uv[kept], number[row[kept]], 1e-2 * touch)
+    corners, hull = shapely.get_coordinates(hulls, return_index=True)
+    points = origins[plane[hull]] + np.einsum("kde,ke->kd", axes[plane[hull]], corners)
+    first = np.searchsorted(hull, np.arange(len(hulls) + 1))
     patches: list[Patch] = []
-    for k, hull in _hulls(uv[kept], number[row[kept]], 1e-2 * touch):
-        points = origins[k] + hull @ axes[k].T
-        if is_wide(points, polygon_area(points, along[k]), touch):
+    for k, area_of_hull, begin, end in zip(plane.tolist(), shapely.area(hulls).tolist(), first[:-1], first[1:]):
+        own = points[begin : end - 1]  # the ring's last corner is its first
+        if is_wide(own, area_of_hull, touch):
             a, b = pairs[of_pair[starts[k]]]
-            patches.append((int(a), int(b), points, along[k], float(total[k]), float(gaps[k])))
+            patches.append((int(a), int(b), own, along[k], float(total[k]), float(apart[k])))
     return patches
 
 
-def _planes(of_pair: Numbers, normals: Array, points: Array, sine: float, thickness: float) -> list[Numbers]:
-    """Rows of facing faces gathered by pair of bodies and, in it, by the plane of the first: normals, points (n, 3)."""
+def _planes(
+    of_pair: Numbers, normals: Array, points: Array, sine: float, wide: float, thickness: float
+) -> list[Numbers]:
+    """Rows of facing faces gathered by pair of bodies and, in it, by the plane of the first: normals, points (n, 3).
+
+    Args:
+        sine: of the largest angle between two normals; where that makes many planes, as of surfaces that are round,
+            `wide` is taken instead.
+        thickness: how far from the first plane (length) a point may be.
+    """
     order = np.argsort(of_pair, kind="stable")
-    planes = []
-    for left in np.split(order, np.flatnonzero(np.diff(of_pair[order])) + 1):
+    planes: list[Numbers] = []
+    for rows in np.split(order, np.flatnonzero(np.diff(of_pair[order])) + 1):
+        own, left, limit = [], rows, sine
         while len(left):
-            same = normals[left] @ normals[left[0]] > 1 - sine**2 / 2
+            same = normals[left] @ normals[left[0]] > 1 - limit**2 / 2
             same &= np.abs((points[left] - points[left[0]]) @ normals[left[0]]) <= thickness
-            planes.append(left[same])
+            own.append(left[same])
             left = left[~same]
+            if limit < wide and len(own) > _MANY:
+                own, left, limit = [], rows, wide
+        planes += own
     return planes
 
 
-def _hulls(uv: Array, group: Numbers, noise: float) -> list[tuple[int, Array]]:
-    """Corners of the convex hull of each group of points in the plane; those less than `noise` off an edge go."""
-    if not len(uv):
-        return []
+def _hulls(uv: Array, group: Numbers, noise: float) -> tuple[Numbers, NDArray[np.object_]]:
+    """Convex hulls of groups of points in the plane, the group of each; corners less than `noise` off an edge go."""
     order = np.argsort(group, kind="stable")
     present, number = np.unique(group[order], return_inverse=True)
     hulls = shapely.simplify(shapely.convex_hull(shapely.multipoints(uv[order], indices=number)), noise)
-    return [(int(k), shapely.get_coordinates(h)[:-1]) for k, h in zip(present, hulls) if h.geom_type == "Polygon"]
+    kept = shapely.get_type_id(hulls) == shapely.GeometryType.POLYGON
+    return present[kept], hulls[kept]

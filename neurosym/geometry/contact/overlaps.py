@@ -195,7 +195,7 @@ class _Pairs:
         passed &= np.einsum("kcd,kd->kc", tb - ta[:, :1], na).min(axis=1) < -self.noise / 2
         near, ta, tb = near[passed], ta[passed], tb[passed]
         origin, _, axes = self._planes(near, s.normals, s.middles)
-        areas, corners = kernels.common_parts((ta - origin) @ axes, (tb - origin) @ axes)
+        areas, corners, _ = kernels.common_parts((ta - origin) @ axes, (tb - origin) @ axes)
         # A gap between two planes is widest at a corner, and balls have most room amid the part in common.
         spots = [corners, (corners + np.roll(corners, 1, axis=1)) / 2, corners.mean(axis=1, keepdims=True)]
         uv = np.concatenate(spots, axis=1)

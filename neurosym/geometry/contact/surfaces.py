@@ -9,7 +9,7 @@ import numpy as np
 
 from neurosym.geometry.bodies import Bodies
 from neurosym.geometry.mesh import kernels
-from neurosym.geometry.mesh.connections import adjacent, alike, planar_regions
+from neurosym.geometry.mesh.connections import adjacent, alike, connected
 from neurosym.geometry.mesh.distances import surface_gaps
 from neurosym.geometry.mesh.flats import Flats
 from neurosym.geometry.mesh.trees import along_curve
@@ -53,13 +53,9 @@ class Surfaces:
     corners: Numbers
 
     @staticmethod
-    def of(bodies: Bodies) -> Surfaces:
-        """The surfaces of bodies as they are."""
-        vertices = [bodies.vertices(b) for b in range(len(bodies))]
-        faces = [np.asarray(b.shape.faces, dtype=np.int64) for b in bodies]
+    def of(points: Array, first_vertex: Numbers, faces: list[Numbers]) -> Surfaces:
+        """The surfaces of bodies whose faces are numbers of their own vertices."""
         counts = np.array([len(f) for f in faces])
-        first_vertex = np.concatenate([[0], np.cumsum([len(v) for v in vertices])])
-        points = np.concatenate(vertices)
         corners = np.concatenate(faces) + np.repeat(first_vertex[:-1], counts)[:, None]
         body = np.repeat(np.arange(len(faces)), counts)
         order = along_curve(points[corners[:, 0]], body)
@@ -93,8 +89,7 @@ class Surfaces:
     @cached_property
     def shells(self) -> tuple[Array, Numbers]:
         """A corner of each connected part of each surface, float64 (s, 3), body by body, with `first` likewise."""
-        order, anything = np.arange(len(self.body)), np.inf
-        starts = planar_regions(self.triangles, self.normals, self.across, order, anything, -2.0)[1]
+        starts = np.unique(connected(self.across), return_index=True)[1]
         return self.triangles[starts, 0], np.searchsorted(self.body[starts], np.arange(len(self.first)))
 
     def gaps(self, pairs: Numbers, *, enough: float = 0.0, far: float = np.inf) -> Array:
@@ -112,9 +107,15 @@ class BodySurfaces:
         self.bodies = bodies
 
     @cached_property
+    def vertices(self) -> tuple[Array, Numbers]:
+        """Their vertices, float64 (k, 3), body by body, and where each body's begin, int64 (n + 1,)."""
+        vertices = [self.bodies.vertices(b) for b in range(len(self.bodies))]
+        return np.concatenate(vertices), np.concatenate([[0], np.cumsum([len(v) for v in vertices])])
+
+    @cached_property
     def exact(self) -> Surfaces:
         """The bodies as they are."""
-        return Surfaces.of(self.bodies)
+        return Surfaces.of(*self.vertices, [np.asarray(b.shape.faces, dtype=np.int64) for b in self.bodies])
 
     @cached_property
     def flats(self) -> Flats:

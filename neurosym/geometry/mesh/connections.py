@@ -80,8 +80,32 @@ def _across(edge: Numbers, count: Numbers) -> Numbers:
 
 
 @compiled
+def connected(across: Numbers) -> Numbers:
+    """The connected part of the surface that each face belongs to, int64 (m,), numbered as they come."""
+    part = np.full(len(across), -1, dtype=np.int64)
+    waiting = np.empty(3 * len(across) + 1, dtype=np.int64)
+    count = 0
+    for seed in range(len(across)):
+        if part[seed] >= 0:
+            continue
+        part[seed], waiting[0] = count, seed
+        top = 1
+        while top:
+            top -= 1
+            face = waiting[top]
+            for k in range(3):
+                other = across[face, k]
+                if other >= 0 and part[other] < 0:
+                    part[other] = count
+                    waiting[top] = other
+                    top += 1
+        count += 1
+    return part
+
+
+@compiled
 def planar_regions(
-    corners: Array, normals: Array, across: Numbers, order: Numbers, within: float, cosine: float
+    corners: Array, normals: Array, across: Numbers, order: Numbers, within: float
 ) -> tuple[Numbers, Numbers]:
     """Regions of triangles that are joined by edges and lie in one plane: of each (m,), and the first one of each.
 
@@ -90,7 +114,6 @@ def planar_regions(
         across: int64 (m, 3), see `adjacent`.
         order: in which triangles are taken as the first of a region.
         within: how far from the plane (length) a corner may be.
-        cosine: of the largest angle between normals.
     """
     region, firsts = np.full(len(corners), -1, dtype=np.int64), np.empty(len(corners), dtype=np.int64)
     waiting = np.empty(3 * len(corners) + 1, dtype=np.int64)
@@ -111,7 +134,7 @@ def planar_regions(
                 turn = 0.0
                 for k in range(3):
                     turn += normals[other, k] * normals[seed, k]
-                flat = turn >= cosine
+                flat = turn >= 1 - 1e-6
                 for c in range(3):
                     height = 0.0
                     for k in range(3):

@@ -57,7 +57,7 @@ class Flats:
             within: how far from their plane (length) corners may be.
         """
         by_area = np.argsort(-areas, kind="stable")
-        region, largest = planar_regions(t, normals, across, by_area, within, 1 - 1e-6)
+        region, largest = planar_regions(t, normals, across, by_area, within)
         many = np.flatnonzero(np.bincount(region, minlength=len(largest)) >= MANY)
         number = np.full(len(largest) + 1, -1)
         number[many] = np.arange(len(many))

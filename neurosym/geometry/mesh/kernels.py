@@ -88,7 +88,7 @@ def meeting(
 ) -> Iterator[tuple[int, int]]:  # fmt: skip
     """Triangles of the first body of a pair, and of the second moved by `shift`, whose bounds come within `gap`.
 
-    Numbers with one label of 0 or more are left out. Of a body with itself each pair comes once.
+    Pairs with one label of 0 or more are left out. Of a body with itself each pair comes once.
     """
     a, b = pair[0], pair[1]
     n, m, base, base_b = first[a + 1] - first[a], first[b + 1] - first[b], 2 * first[a], 2 * first[b]
@@ -307,14 +307,18 @@ def straddling_pairs(
 
 
 @compiled
-def common_parts(first: Array, second: Array) -> tuple[Array, Array]:
-    """Of pairs of triangles of the plane, (n, 3, 2) each: area in common (n,), corners (n, 6, 2), the last repeated."""
-    areas, parts = np.zeros(len(first)), np.zeros((len(first), 6, 2))
+def common_parts(first: Array, second: Array) -> tuple[Array, Array, Numbers]:
+    """What pairs of triangles of the plane, (n, 3, 2) each, have in common.
+
+    Returns:
+        Areas (n,), corners (n, 8, 2), the last repeated, and how many corners there are (n,).
+    """
+    areas, parts, counts = np.zeros(len(first)), np.zeros((len(first), 8, 2)), np.zeros(len(first), dtype=np.int64)
     one, two = np.empty((12, 2)), np.empty((12, 2))
     for k in range(len(first)):
         n = clip(first[k], second[k], 0.0, 0.0, one, two)
         if n > 2:
-            areas[k] = area_and_rim(one, n)[0]
-            for c in range(6):
+            areas[k], counts[k] = area_and_rim(one, n)[0], min(n, 8)
+            for c in range(8):
                 parts[k, c, 0], parts[k, c, 1] = one[min(c, n - 1), 0], one[min(c, n - 1), 1]
-    return areas, parts
+    return areas, parts, counts

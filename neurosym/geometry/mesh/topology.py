@@ -9,7 +9,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from neurosym.geometry.mesh.connections import alike, opposite
+from neurosym.geometry.mesh.connections import adjacent, alike, connected, opposite
 from neurosym.support.arrays import Array, Numbers, Truths
 
 #: Open edges beyond this number are a hole, not a row of T-junctions: nobody is asked to match them up.
@@ -113,7 +113,7 @@ def same_winding(faces: Numbers) -> Numbers | None:
 
 def shells_of(faces: Numbers) -> Numbers:
     """int64 (m,): the number of the shell that each face belongs to; shells that meet in an edge are two."""
-    return _components(neighbours(faces)[0], len(faces))
+    return connected(adjacent(faces))
 
 
 def unshared(faces: Numbers, groups: Numbers) -> tuple[Numbers, Numbers]:
