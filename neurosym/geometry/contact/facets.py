@@ -31,14 +31,18 @@ def facet_patches(
         touch: how wide a patch is at least (length).
         mate: how deep (length) the faces may overlap.
     """
-    exact, flats, (small, flat) = surfaces.exact, surfaces.flats, surfaces.split_trees
+    if not len(pairs):
+        return []
+    exact, flats = surfaces.exact, surfaces.flats
     # A flat face of many triangles has a number beyond theirs: two such are clipped as polygons.
     m = len(exact.triangles)
     normals, middles = (np.concatenate(x) for x in ((exact.normals, flats.normals), (exact.middles, flats.middles)))
-    gaps = np.full(len(pairs), 2 * gap)
+    within, is_flat = np.full(len(pairs), 2 * gap), flats.of_triangle >= 0
+    small = exact.facing_trees(~is_flat, 2 * gap, sine)
+    flat = exact.facing_trees(is_flat, 2 * gap, sine) if is_flat.any() else small
     near = [
-        kernels.facing_pairs(*one, *two, exact.normals, exact.first, pairs, gaps, sine)
-        for one, two in ((small, exact.trees), (flat, small))
+        kernels.facing_pairs(*one[0], *two[1], exact.normals, exact.first, pairs, within, sine)
+        for one, two in ((small, small), (small, flat), (flat, small))[: 3 if is_flat.any() else 1]
     ]
     of_pair, i, j = np.concatenate([*near, np.add(flats.facing(pairs, 2 * gap, sine), (0, m, m))]).T
     planes = _planes(of_pair, normals[i], middles[i], max(sine, 1e-3), round_sine, 2 * mate)

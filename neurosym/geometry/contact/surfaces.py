@@ -80,6 +80,15 @@ class Surfaces:
         """The same, of some of the triangles, bool (m,), alone."""
         return kernels.tree_bounds(self.triangles, used, self.first)
 
+    def facing_trees(self, used: Truths, gap: float, sine: float) -> tuple[Trees, Trees]:
+        """Trees of some triangles by where they are and how they look, and of the same as others see them.
+
+        Bounds have six columns, normals in the last three: those of the first come within `gap` of those of the second
+        where normals are opposite to `sine`.
+        """
+        normals = gap / (1.1 * max(sine, 1e-9)) * self.normals
+        return tuple(kernels.facing_bounds(self.triangles, sign * normals, used, self.first) for sign in (1.0, -1.0))
+
     @cached_property
     def across(self) -> Numbers:
         """The triangle across each edge, int64 (m, 3); -1 where there is not just one."""

@@ -58,12 +58,36 @@ def tree_bounds(triangles: Array, used: Truths, first: Numbers) -> tuple[Array, 
                 for k in range(3):
                     low[base + n + t, k] = min(corners[0, k], corners[1, k], corners[2, k])
                     high[base + n + t, k] = max(corners[0, k], corners[1, k], corners[2, k])
-        for node in range(base + n - 1, base, -1):
-            child = 2 * node - base
-            for k in range(3):
-                low[node, k] = min(low[child, k], low[child + 1, k])
-                high[node, k] = max(high[child, k], high[child + 1, k])
+        gather(low, high, base, n)
     return low, high
+
+
+@compiled
+def facing_bounds(triangles: Array, normals: Array, used: Truths, first: Numbers) -> tuple[Array, Array]:
+    """The same with six columns, the bounds of normals (m, 3) in the last three."""
+    low = np.full((2 * len(triangles), 6), np.inf)
+    high = np.full((2 * len(triangles), 6), -np.inf)
+    for b in range(len(first) - 1):
+        n, base = first[b + 1] - first[b], 2 * first[b]
+        for t in range(n):
+            if used[first[b] + t]:
+                corners = triangles[first[b] + t]
+                for k in range(3):
+                    low[base + n + t, k] = min(corners[0, k], corners[1, k], corners[2, k])
+                    high[base + n + t, k] = max(corners[0, k], corners[1, k], corners[2, k])
+                    low[base + n + t, 3 + k] = high[base + n + t, 3 + k] = normals[first[b] + t, k]
+        gather(low, high, base, n)
+    return low, high
+
+
+@inlined
+def gather(low: Array, high: Array, base: int, n: int) -> None:
+    """Bounds of a tree's inner nodes from those of its leaves."""
+    for node in range(base + n - 1, base, -1):
+        child = 2 * node - base
+        for k in range(low.shape[1]):
+            low[node, k] = min(low[child, k], low[child + 1, k])
+            high[node, k] = max(high[child, k], high[child + 1, k])
 
 
 @compiled
@@ -100,7 +124,7 @@ def meeting(
         p, q = waiting[top, 0], waiting[top, 1]
         x, y = base + p, base_b + q
         size = 0.0
-        for k in range(3):
+        for k in range(low.shape[1]):
             if low[x, k] - gap > high_b[y, k] + shift[k] or low_b[y, k] + shift[k] > high[x, k] + gap:
                 break
             size += high[x, k] - low[x, k] - high_b[y, k] + low_b[y, k]
@@ -263,7 +287,7 @@ def facing_pairs(
         sine: of the largest angle between one normal (m, 3) and the other turned round; 1: any less than square.
     """
     near, labels = np.empty((64, 3), dtype=np.int64), np.full(len(low), -1, dtype=np.int64)
-    count, still = 0, np.zeros(3)
+    count, still = 0, np.zeros(low.shape[1])
     for k in range(len(pairs)):
         for i, j in meeting(low, high, low_b, high_b, labels, first, pairs[k], still, gaps[k]):
             a, b = normals[i], normals[j]
