@@ -45,6 +45,11 @@ def facet_patches(
         for one, two in ((small, small), (small, flat), (flat, small))[: 3 if is_flat.any() else 1]
     ]
     of_pair, i, j = np.concatenate([*near, np.add(flats.facing(pairs, 2 * gap, sine), (0, m, m))]).T
+    # How far apart two planes are is asked again where they have a part in common: they need not be quite parallel.
+    reach = 1.1 * sine * np.linalg.norm(np.ptp(surfaces.bodies.bounds[pairs[of_pair, 1]], axis=1), axis=1)
+    apart = np.einsum("kd,kd->k", normals[i], middles[j] - middles[i])
+    kept = (apart <= gap + reach) & (apart >= -mate - reach)
+    of_pair, i, j = of_pair[kept], i[kept], j[kept]
     planes = _planes(of_pair, normals[i], middles[i], max(sine, 1e-3), round_sine, 2 * mate)
     if not planes:
         return []

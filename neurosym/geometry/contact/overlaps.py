@@ -98,12 +98,14 @@ class _Pairs:
         goes through a face."""
         s = self.exact
         under = s.middles - 2 * self.noise * s.normals
-        edges = [(s.triangles[:, k] + s.triangles[:, (k + 1) % 3]) / 2 for k in range(3)]
+        t, k = np.nonzero(s.across < np.arange(len(s.across))[:, None])  # each edge once
+        edges = (s.triangles[t, k] + s.triangles[t, (k + 1) % 3]) / 2
         overlap = np.zeros(len(self.pairs), dtype=bool)
         if len(self.pairs):
             overlap[self.places[1]] = True
-        probes = [(s.vertices, s.first_vertex), (under, s.first), *((e, s.first) for e in edges)]
-        for probe, first in probes:
+        for probe, first in (
+            (s.vertices, s.first_vertex), (under, s.first), (edges, np.searchsorted(t, s.first))
+        ):  # fmt: skip
             points, pair, other = self._in_other(probe, first, ~overlap)
             # On the surface itself a point may seem to be on either side.
             overlap[pair[nearest(points, other, s.triangles, *s.trees, s.first) > self.noise / 2]] = True
@@ -159,7 +161,7 @@ class _Pairs:
         ]
         pair, i, j = np.concatenate(crossing).T
         found: list[Points] = [(np.zeros((0, 3)), pair[:0])]
-        for one, other in ((i, j), (j, i)):
+        for one, other in ((i, j), (j, i)) if len(i) else ():
             for k in range(3):
                 edges = s.triangles[one][:, [k, (k + 1) % 3]]
                 through, where = pierced(edges, s.triangles[other], s.normals[other], self.noise / 2)

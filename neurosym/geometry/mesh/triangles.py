@@ -69,6 +69,8 @@ def crossing_pairs(vertices: Array, faces: Numbers, margin: float) -> Numbers:
     trees, labels = kernels.tree_bounds(t, body == 0, first), kernels.tree_labels(label[order], first)
     one = np.zeros((1, 2), dtype=np.int64)
     i, j = kernels.straddling_pairs(*trees, *trees, labels, t, normals, first, one, margin).T[1:]
+    if not len(i):
+        return np.zeros((0, 2), dtype=np.int64)
     hit = np.zeros(len(i), dtype=bool)
     for k in range(3):
         hit |= pierced(t[i][:, [k, (k + 1) % 3]], t[j], normals[j], margin)[0]
