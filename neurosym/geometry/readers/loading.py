@@ -31,6 +31,7 @@ from neurosym.geometry.readers.mesh_checks import examine
 from neurosym.geometry.readers.meshes import as_triangles, parts_from_meshes
 from neurosym.geometry.readers.names import distinct
 from neurosym.geometry.readers.obj import read_obj
+from neurosym.geometry.readers.repeats import Examiner
 from neurosym.geometry.readers.solids import separate
 from neurosym.geometry.readers.step import read_step
 from neurosym.geometry.readers.threemf import read_3mf
@@ -205,12 +206,13 @@ def _examined(
     notes: list[Note] = []
     faults: list[Note] = []
     sound: list[RawMesh | Part] = []
+    examiner = Examiner()
     for number, part in enumerate(given):
         progress(number)
         if isinstance(part, Part):
             wrong = _wrong(part)
         else:
-            seen = examine(part)
+            seen = examiner.examine(part)
             notes += seen.notes
             wrong = list(seen.faults)
             part = replace(part, vertices=seen.vertices, faces=seen.faces)
