@@ -367,7 +367,7 @@ def test_pairs_of_triangles_looked_at_grow_with_the_facets_not_with_their_square
         nodes = Nodes()
         for one, two in ((small, small), (small, flat), (flat, small)):
             pair = np.array([0, 1])
-            walk = kernels.meeting.__wrapped__(*one[0], *two[1], nodes, exact.first, pair, np.zeros(6), gap)
+            walk = kernels.meeting.__wrapped__(*one, *two, nodes, exact.first, pair, np.zeros(6), gap)
             assert not list(walk)
         looked_at.append(nodes.asked)
     assert power(sizes, looked_at) < 1.3

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from neurosym.geometry.shapes import Body, Box, Mesh, Part
+from neurosym.support import arrays
 from neurosym.support.arrays import Array, Numbers, Truths
 
 
@@ -83,7 +84,7 @@ class Bodies:
         bounds: Array = np.stack([centres - half, centres + half], axis=1)
         for i in np.flatnonzero(~self.is_box):
             vertices = self.vertices(int(i))
-            bounds[i] = vertices.min(axis=0), vertices.max(axis=0)
+            bounds[i] = arrays.bounds(vertices)
         return bounds
 
     @cached_property
@@ -103,7 +104,7 @@ class Bodies:
         """The smallest extent of any body in its own frame: what tolerances are shares of."""
         sizes = self.box_sizes.copy()
         for i in np.flatnonzero(~self.is_box):
-            sizes[i] = np.ptp(self[int(i)].shape.vertices, axis=0)
+            sizes[i] = arrays.extents(self[int(i)].shape.vertices)
         return float(sizes.min())
 
     def axes(self, parallel: float) -> Array:

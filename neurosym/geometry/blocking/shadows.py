@@ -14,7 +14,7 @@ import shapely
 from neurosym.geometry.contact.surfaces import GRID, Surfaces
 from neurosym.geometry.mesh import kernels
 from neurosym.geometry.mesh.broad_phase import MOST, near_pairs
-from neurosym.support.arrays import Array, Numbers, Truths
+from neurosym.support.arrays import Array, Numbers, Truths, bounds
 
 #: So many narrow pieces of an overlap are put together before the rest of them are looked for.
 _FEW = 1_000
@@ -24,8 +24,7 @@ class Shadows:
     """The triangles of surfaces in a frame, float64 (3, 3), whose last column is a direction."""
 
     def __init__(self, surfaces: Surfaces, frame: Array, touch: float) -> None:
-        middle = (surfaces.vertices.min(axis=0) + surfaces.vertices.max(axis=0)) / 2
-        points = (surfaces.vertices - middle) @ frame
+        points = (surfaces.vertices - np.mean(bounds(surfaces.vertices), axis=0)) @ frame
         self.triangles, vectors, _, longest = kernels.measured(points, surfaces.corners)
         self.first, self.touch = surfaces.first, touch
         # Seen edge-on a triangle has no height to speak of.

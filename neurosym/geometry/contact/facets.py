@@ -41,7 +41,7 @@ def facet_patches(
     small = exact.facing_trees(~is_flat, 2 * gap, sine)
     flat = exact.facing_trees(is_flat, 2 * gap, sine) if is_flat.any() else small
     near = [
-        kernels.facing_pairs(*one[0], *two[1], exact.normals, exact.first, pairs, within, sine)
+        kernels.facing_pairs(*one, *two, exact.normals, exact.first, pairs, within, sine)
         for one, two in ((small, small), (small, flat), (flat, small))[: 3 if is_flat.any() else 1]
     ]
     of_pair, i, j = np.concatenate([*near, np.add(flats.facing(pairs, 2 * gap, sine), (0, m, m))]).T

@@ -80,14 +80,14 @@ class Surfaces:
         """The same, of some of the triangles, bool (m,), alone."""
         return kernels.tree_bounds(self.triangles, used, self.first)
 
-    def facing_trees(self, used: Truths, gap: float, sine: float) -> tuple[Trees, Trees]:
-        """Trees of some triangles by where they are and how they look, and of the same as others see them.
+    def facing_trees(self, used: Truths, gap: float, sine: float) -> Trees:
+        """Trees of some triangles by where they are and how they look.
 
-        Bounds have six columns, normals in the last three: those of the first come within `gap` of those of the second
-        where normals are opposite to `sine`.
+        Bounds have six columns, normals in the last three, on such a scale that those which are opposite, to `sine`,
+        come within `gap`.
         """
         normals = gap / (1.1 * max(sine, 1e-9)) * self.normals
-        return tuple(kernels.facing_bounds(self.triangles, sign * normals, used, self.first) for sign in (1.0, -1.0))
+        return kernels.facing_bounds(self.triangles, normals, used, self.first)
 
     @cached_property
     def across(self) -> Numbers:

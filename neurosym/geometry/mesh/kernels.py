@@ -112,6 +112,8 @@ def meeting(
 ) -> Iterator[tuple[int, int]]:  # fmt: skip
     """Triangles of the first body of a pair, and of the second moved by `shift`, whose bounds come within `gap`.
 
+    Where bounds have more than three columns these are normals, and have to be opposite.
+
     Pairs with one label of 0 or more are left out. Of a body with itself each pair comes once.
     """
     a, b = pair[0], pair[1]
@@ -125,9 +127,12 @@ def meeting(
         x, y = base + p, base_b + q
         size = 0.0
         for k in range(low.shape[1]):
-            if low[x, k] - gap > high_b[y, k] + shift[k] or low_b[y, k] + shift[k] > high[x, k] + gap:
+            least, most = low_b[y, k] + shift[k], high_b[y, k] + shift[k]
+            if k > 2:  # normals: those of the second body turned round
+                least, most = -most, -least
+            if low[x, k] - gap > most or least > high[x, k] + gap:
                 break
-            size += high[x, k] - low[x, k] - high_b[y, k] + low_b[y, k]
+            size += high[x, k] - low[x, k] - most + least
         else:
             if labels[x] >= 0 and labels[x] == labels[y]:
                 continue

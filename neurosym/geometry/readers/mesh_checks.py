@@ -15,7 +15,7 @@ from neurosym.geometry.notes import Note
 from neurosym.geometry.readers.contents import RawMesh
 from neurosym.geometry.readers.limits import MAX_FACES
 from neurosym.geometry.tolerances import DEFAULT_TOLERANCES
-from neurosym.support.arrays import Array, Numbers
+from neurosym.support.arrays import Array, Numbers, extents
 
 #: Extents of a part lie between these, in the file's unit: beyond, squares and cubes of lengths lose all digits.
 SMALLEST, LARGEST = 1e-9, 1e9
@@ -106,14 +106,14 @@ def _can_be_measured(vertices: Array, faces: Numbers, rounding: float, found: _F
         found.fault("nan", bad, f"has {bad} vertices that are NaN or infinite", "Export the part again.")
         return False
     with np.errstate(over="ignore"):
-        extents = np.ptp(corners, axis=0)
-    if not SMALLEST <= extents.max() <= LARGEST:
-        said = f"is {extents.max():g} long, expected {SMALLEST:g} to {LARGEST:g}"
-        found.fault("flat" if extents.max() < SMALLEST else "far", extents.max(), said, "Use another unit of length.")
+        reach = extents(corners)
+    if not SMALLEST <= reach.max() <= LARGEST:
+        said = f"is {reach.max():g} long, expected {SMALLEST:g} to {LARGEST:g}"
+        found.fault("flat" if reach.max() < SMALLEST else "far", reach.max(), said, "Use another unit of length.")
         return False
     away = float(np.abs(corners).max())
     step = 2 * away * rounding
-    thin = float(extents[extents > SMALLEST].min())
+    thin = float(reach[reach > SMALLEST].min())
     if step > DEFAULT_TOLERANCES.touch * thin / 4:
         said = f"lies {away:g} from the origin, where coordinates come in steps of {step:.2g}; it is {thin:g} thin"
         found.fault("far", away, said, "Move the assembly to the origin before exporting it.")
@@ -124,7 +124,7 @@ def _can_be_measured(vertices: Array, faces: Numbers, rounding: float, found: _F
 def _closed(vertices: Array, faces: Numbers, found: _Findings) -> tuple[Array, Numbers]:
     """The mesh with its vertices merged, its faces of no area dropped, wound one way; faults where it is open."""
     given = len(faces)
-    extent = float(np.ptp(vertices[topology.in_use(vertices, faces)], axis=0).max())
+    extent = float(extents(vertices[topology.in_use(vertices, faces)]).max())
     exact, joined = topology.merged(vertices, faces)
     vertices, merged = topology.merged(exact, joined, MERGE * extent)
     faces = topology.without_repeats(merged)
@@ -170,7 +170,7 @@ def _outward(vertices: Array, faces: Numbers, found: _Findings) -> Numbers:
     shells = topology.shells_of(faces)
     volumes = topology.shell_volumes(vertices, faces, shells)
     area = float(np.linalg.norm(triangles.area_vectors(vertices[faces]) / 2, axis=1).sum())
-    extent = float(np.ptp(vertices, axis=0).max())
+    extent = float(extents(vertices).max())
     total = float(volumes.sum())
     if 2 * np.abs(volumes).sum() <= FLAT * extent * area or abs(total) <= FLAT * extent * area / 2:
         remedy = "Give it a thickness, or wind its faces one way."
@@ -191,7 +191,7 @@ def _outward(vertices: Array, faces: Numbers, found: _Findings) -> Numbers:
 
 
 def _look_for_crossings(vertices: Array, faces: Numbers, found: _Findings) -> None:
-    margin = CROSSING * float(np.ptp(vertices, axis=0).min())
+    margin = CROSSING * float(extents(vertices).min())
     folds = _folds(vertices, faces, margin)
     if folds:
         said = f"crosses itself: {folds} pairs of neighbouring faces are folded onto one another"

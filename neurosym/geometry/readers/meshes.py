@@ -12,7 +12,7 @@ from neurosym.geometry.mesh.topology import signed_volume
 from neurosym.geometry.mesh.triangles import are_convex, area_vectors
 from neurosym.geometry.shapes import Body, Box, Convex, Mesh, Part
 from neurosym.geometry.tolerances import Tolerances
-from neurosym.support.arrays import Array, Numbers, Truths
+from neurosym.support.arrays import Array, Numbers, Truths, bounds
 
 Triangles = tuple[Array, Numbers]
 
@@ -48,7 +48,7 @@ def parts_from_meshes(meshes: Mapping[str, Triangles], tolerances: Tolerances) -
 
 def _one_body(vertices: Array, faces: Numbers) -> Body:
     """A single body, its frame at the centre of its bounds, so that numbers stay small."""
-    centre = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
+    centre = np.mean(bounds(vertices), axis=0)
     X = np.eye(4)
     X[:3, 3] = centre
     local = vertices - centre

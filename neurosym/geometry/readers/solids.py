@@ -13,7 +13,7 @@ from neurosym.geometry.mesh.broad_phase import CHUNK, near_pairs
 from neurosym.geometry.notes import Note
 from neurosym.geometry.readers.contents import Contents, RawMesh, united
 from neurosym.geometry.readers.mesh_checks import FLAT, LARGEST, MERGE
-from neurosym.support.arrays import Array, Numbers
+from neurosym.support.arrays import Array, Numbers, extents
 
 
 def by_name(path: Path, meshes: Sequence[RawMesh]) -> Contents:
@@ -52,7 +52,7 @@ def separated(mesh: RawMesh) -> list[RawMesh]:
         return [mesh]
     if not np.abs(mesh.vertices).max() <= LARGEST:
         return [mesh]
-    extent = float(np.ptp(mesh.vertices, axis=0).max())
+    extent = float(extents(mesh.vertices).max())
     vertices, faces = topology.merged(*topology.merged(mesh.vertices, mesh.faces), MERGE * extent)
     once = topology.without_repeats(faces, cancel=False)
     if len(topology.without_repeats(faces)):
