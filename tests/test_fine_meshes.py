@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 import neurosym as ns
 from neurosym.geometry.assembly import NO_TABLE
 from neurosym.geometry.blocking.mating_overlaps import _least_overlaps
-from neurosym.geometry.blocking.shadows import Shadows
+from neurosym.geometry.blocking.shadows import Shadows, _are_wide
 from neurosym.geometry.contact import collision
 from neurosym.geometry.contact.contacts import TABLE
 from neurosym.geometry.contact.overlaps import overlaps
@@ -222,6 +222,25 @@ def test_strips_narrower_than_the_tolerance_are_wide_together_or_not(width):
     share = touch / assembly.smallest_extent
     stated = ns.Assembly(assembly.parts, NO_TABLE, tolerances=ns.geometry.tolerances.Tolerances(touch=share))
     assert blocking(stated, np.array([[0, 0, 1.0]]))[0][0] == (0b010 if width > 1 else 0)
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.integers(0, 10**6), st.floats(0.3, 3), st.sampled_from([1e-6, 1.0, 1e4]))
+def test_slivers_are_wide_together_where_they_leave_nothing_out(seed, side, scale):
+    """A square of so many tolerances cut into some hundred pieces, most of them slivers, holds a disc or does not."""
+    rng = np.random.default_rng(seed)
+    cuts = np.sort(np.concatenate([[0.0, 1.0], rng.uniform(0, 1, 40) ** 4, rng.choice([0.5, 0.5 + 1e-9], 3)]))
+    a, b = cuts[:-1, None], cuts[1:, None]
+    one, zero = np.ones_like(a), np.zeros_like(a)
+    corners = [np.stack([np.hstack(c) for c in ((a, zero), (b, zero), (b, one))], axis=1)]
+    corners.append(np.stack([np.hstack(c) for c in ((a, zero), (b, one), (a, one))], axis=1))
+    triangles_of = np.concatenate(corners) * side
+    turn = rng.uniform(0, 6)
+    R = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+    padded = np.concatenate([triangles_of, np.repeat(triangles_of[:, 2:], 5, axis=1)], axis=1)
+    pieces = padded @ R.T + rng.uniform(-9, 9, 2)
+    if abs(side - 1) > 0.02:
+        assert _are_wide(scale * pieces, scale) is (side > 1)
 
 
 # -- overlaps -----------------------------------------------------------------------------------------------------

@@ -64,15 +64,18 @@ class Shadows:
 
 def _are_wide(pieces: Array, touch: float) -> bool:
     """Whether convex polygons, corners (n, 8, 2), hold a disc of diameter `touch` together."""
+    pieces = (pieces - pieces[0, 0]) / touch
     low, high = pieces.min(axis=1), pieces.max(axis=1)
     x, y = np.moveaxis(pieces - pieces[:, :1], 2, 0)
     area = np.abs((x[:, :-1] * y[:, 1:] - y[:, :-1] * x[:, 1:]).sum(axis=1)) / 2
     # A disc is covered by pieces that come near one another; no piece covers more of it than a stripe of its width.
     width = 2 * area / np.maximum((high - low).max(axis=1), 1e-300)
-    near = near_pairs((low - touch, high + touch), (low, high), MOST)
+    chosen = width > GRID
+    near = near_pairs((low - 1, high + 1), (low, high), MOST)
     if near is not None:
         one, other = near.T
-        crowded = np.bincount(one, width[other], len(pieces)) >= np.pi / 4 * touch
-        pieces = pieces[np.unique(other[crowded[one]])]
-    together = shapely.union_all(shapely.polygons(pieces), grid_size=GRID * touch)
-    return not together.buffer(-touch / 2).is_empty
+        crowded = np.bincount(one, width[other], len(pieces)) >= np.pi / 4
+        chosen[np.setdiff1d(np.arange(len(pieces)), other[crowded[one]])] = False
+    # A little larger, so that neighbours overlap: what shares an edge to the last digit is where GEOS goes wrong.
+    larger = shapely.buffer(shapely.polygons(pieces[chosen]), GRID, join_style="mitre")
+    return not shapely.union_all(larger).buffer(-0.5 - GRID).is_empty
