@@ -12,7 +12,7 @@ import numpy as np
 import shapely
 
 from neurosym.geometry.contact.surfaces import GRID, Surfaces
-from neurosym.geometry.mesh import kernels
+from neurosym.geometry.mesh import kernels, trees
 from neurosym.geometry.mesh.broad_phase import MOST, near_pairs
 from neurosym.support.arrays import Array, Numbers, Truths, bounds
 
@@ -25,7 +25,7 @@ class Shadows:
 
     def __init__(self, surfaces: Surfaces, frame: Array, touch: float) -> None:
         points = (surfaces.vertices - np.mean(bounds(surfaces.vertices), axis=0)) @ frame
-        self.triangles, vectors, _, longest = kernels.measured(points, surfaces.corners)
+        self.triangles, vectors, _, longest = trees.measured(points, surfaces.corners)
         self.first, self.touch = surfaces.first, touch
         # Seen edge-on a triangle has no height to speak of.
         seen, area = 1e-6 * longest**2, vectors[:, 2]

@@ -18,7 +18,7 @@ import shapely
 from numpy.typing import NDArray
 
 from neurosym.geometry.contact.surfaces import BodySurfaces
-from neurosym.geometry.mesh import kernels
+from neurosym.geometry.mesh import kernels, trees
 from neurosym.geometry.mesh.broad_phase import overlapping_pairs, spans
 from neurosym.geometry.mesh.distances import are_inside, nearest
 from neurosym.geometry.mesh.triangles import pierced, plane_axes
@@ -152,7 +152,7 @@ class _Pairs:
         """Where edges of one body go through faces of the other."""
         s, flats, (small, flat) = self.exact, self.surfaces.flats, self.surfaces.split_trees
         # Large flat faces in one plane do not go through one another, however many triangles they have.
-        planes = kernels.tree_labels(flats.planes(self.noise / 2)[flats.of_triangle], s.first)
+        planes = trees.tree_labels(flats.planes(self.noise / 2)[flats.of_triangle], s.first)
         none = np.full(len(planes), -1)
         passes = ((small, s.trees, none), (flat, small, none), (flat, flat, planes))
         crossing = [

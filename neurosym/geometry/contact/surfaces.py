@@ -8,11 +8,10 @@ from functools import cached_property
 import numpy as np
 
 from neurosym.geometry.bodies import Bodies
-from neurosym.geometry.mesh import kernels
+from neurosym.geometry.mesh import kernels, trees
 from neurosym.geometry.mesh.connections import adjacent, alike, connected
 from neurosym.geometry.mesh.distances import surface_gaps
 from neurosym.geometry.mesh.flats import Flats
-from neurosym.geometry.mesh.trees import along_curve
 from neurosym.support.arrays import Array, Numbers, Truths
 
 #: Polygons are clipped on a grid of this share of the touching tolerance: with floating numbers GEOS may take two
@@ -58,9 +57,9 @@ class Surfaces:
         counts = np.array([len(f) for f in faces])
         corners = np.concatenate(faces) + np.repeat(first_vertex[:-1], counts)[:, None]
         body = np.repeat(np.arange(len(faces)), counts)
-        order = along_curve(points[corners[:, 0]], body)
+        order = trees.along_curve(points[corners[:, 0]], body)
         corners = corners[order]
-        triangles, vectors, middles, longest = kernels.measured(points, corners)
+        triangles, vectors, middles, longest = trees.measured(points, corners)
         areas = np.sqrt(np.einsum("md,md->m", vectors, vectors)) / 2
         # Needles and points have no normal to speak of.
         kept = 2 * areas > 1e-9 * np.maximum(longest, 1e-300) ** 2

@@ -18,34 +18,6 @@ from neurosym.support.compiled import compiled, inlined
 
 
 @compiled
-def measured(points: Array, corners: Numbers) -> tuple[Array, Array, Array, Array]:
-    """Of triangles given as numbers of points, int64 (m, 3): corners (m, 3, 3), area vectors, middles, longest sides.
-
-    Area vectors (m, 3) are normals as long as twice the area.
-    """
-    m = len(corners)
-    triangles, vectors, middles, longest = np.empty((m, 3, 3)), np.empty((m, 3)), np.empty((m, 3)), np.empty(m)
-    for t in range(m):
-        for c in range(3):
-            for k in range(3):
-                triangles[t, c, k] = points[corners[t, c], k]
-        square = 0.0
-        for c in range(3):
-            side = 0.0
-            for k in range(3):
-                apart = triangles[t, c, k] - triangles[t, (c + 1) % 3, k]
-                side += apart * apart
-            square = max(square, side)
-        longest[t] = np.sqrt(square)
-        a, b, c0 = triangles[t, 0], triangles[t, 1], triangles[t, 2]
-        for k in range(3):
-            p, q = (k + 1) % 3, (k + 2) % 3
-            vectors[t, k] = (b[p] - a[p]) * (c0[q] - a[q]) - (b[q] - a[q]) * (c0[p] - a[p])
-            middles[t, k] = (a[k] + b[k] + c0[k]) / 3
-    return triangles, vectors, middles, longest
-
-
-@compiled
 def tree_bounds(triangles: Array, used: Truths, first: Numbers) -> tuple[Array, Array]:
     """Bounds of the nodes of all trees, float64 (2 m, 3) each; nodes without a triangle in use are empty."""
     low = np.full((2 * len(triangles), 3), np.inf)
@@ -88,21 +60,6 @@ def gather(low: Array, high: Array, base: int, n: int) -> None:
         for k in range(low.shape[1]):
             low[node, k] = min(low[child, k], low[child + 1, k])
             high[node, k] = max(high[child, k], high[child + 1, k])
-
-
-@compiled
-def tree_labels(labels: Numbers, first: Numbers) -> Numbers:
-    """int64 (2 m,): the label that all triangles under a node bear, -1 where they differ."""
-    nodes = np.full(2 * len(labels), -1, dtype=np.int64)
-    for b in range(len(first) - 1):
-        n, base = first[b + 1] - first[b], 2 * first[b]
-        for t in range(n):
-            nodes[base + n + t] = labels[first[b] + t]
-        for node in range(base + n - 1, base, -1):
-            child = 2 * node - base
-            if nodes[child] == nodes[child + 1]:
-                nodes[node] = nodes[child]
-    return nodes
 
 
 @inlined

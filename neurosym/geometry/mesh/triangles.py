@@ -6,11 +6,10 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from neurosym.geometry.mesh import distances as points_and_trees
-from neurosym.geometry.mesh import kernels
+from neurosym.geometry.mesh import kernels, trees
 from neurosym.geometry.mesh.connections import adjacent, alike, has_valley
 from neurosym.geometry.mesh.flats import Flats
 from neurosym.geometry.mesh.topology import in_use, signed_volume
-from neurosym.geometry.mesh.trees import along_curve
 from neurosym.support.arrays import Array, Numbers, Truths
 
 #: Which of 997 faces are held against all vertices first: of most surfaces that are not convex one of them shows it.
@@ -58,17 +57,17 @@ def crossing_pairs(vertices: Array, faces: Numbers, margin: float) -> Numbers:
     Faces that only touch, or lie in one plane, do not cross.
     """
     body = np.zeros(len(faces), dtype=np.int64)
-    t, vectors, middles, _ = kernels.measured(vertices, faces)
+    t, vectors, middles, _ = trees.measured(vertices, faces)
     areas = np.linalg.norm(vectors, axis=1)
     normals = vectors / np.maximum(areas, 1e-300)[:, None]
     # Fans and flat lids have many neighbours in their own plane: they come one after the other, and are left out.
     label = Flats.of(t, normals, areas, middles, body, adjacent(faces), margin).of_triangle
     order = np.argsort(label, kind="stable")
-    order = order[along_curve(t[order, 0], label[order])]
+    order = order[trees.along_curve(t[order, 0], label[order])]
     t, normals, first = t[order], normals[order], np.array([0, len(t)])
-    trees, labels = kernels.tree_bounds(t, body == 0, first), kernels.tree_labels(label[order], first)
+    nodes, labels = kernels.tree_bounds(t, body == 0, first), trees.tree_labels(label[order], first)
     one = np.zeros((1, 2), dtype=np.int64)
-    i, j = kernels.straddling_pairs(*trees, *trees, labels, t, normals, first, one, margin).T[1:]
+    i, j = kernels.straddling_pairs(*nodes, *nodes, labels, t, normals, first, one, margin).T[1:]
     if not len(i):
         return np.zeros((0, 2), dtype=np.int64)
     hit = np.zeros(len(i), dtype=bool)
@@ -112,6 +111,6 @@ def distances(points: Array, triangles: Array) -> Array:
 
 def _one_tree(points: Array, triangles: Array) -> tuple[Array, Numbers, Array, Array, Array, Numbers]:
     one = np.zeros(len(triangles), dtype=np.int64)
-    t = triangles[along_curve(triangles[:, 0], one)]
+    t = triangles[trees.along_curve(triangles[:, 0], one)]
     first = np.array([0, len(t)])
     return points, np.zeros(len(points), dtype=np.int64), t, *kernels.tree_bounds(t, one == 0, first), first
