@@ -15,10 +15,11 @@ from typing import get_type_hints
 import numpy as np
 import pytest
 import trimesh
-from broken_inputs import PUZZLE, box, folder_of, gltf, model_3mf, obj, object_3mf, write
+from broken_inputs import PUZZLE, box, folder_of, gltf, model_3mf, obj, object_3mf, robot, write, zipped
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
+from step_files import step_boxes
 
 import neurosym as ns
 from neurosym.commands.common import FileOptions
@@ -32,6 +33,7 @@ from neurosym.geometry.notes import FaultyPartsError
 from neurosym.geometry.queries import AssemblyGeometry
 from neurosym.geometry.readers.burrtools import rotations
 from neurosym.geometry.readers.contents import RawMesh
+from neurosym.geometry.readers.loading import _READERS
 from neurosym.geometry.readers.mating import MAX_TOUCH
 from neurosym.geometry.readers.mesh_checks import examine
 from neurosym.geometry.readers.meshes import parts_from_meshes
@@ -73,6 +75,38 @@ def same(a: ns.Assembly, b: ns.Assembly) -> bool:
 
 
 # -- formats --------------------------------------------------------------------------------------------------
+
+
+def box_as(ending: str, folder: Path) -> Path:
+    """The box of 1 x 2 x 3, in a file of its own."""
+    path = folder / f"low{ending}"
+    if ending in (".step", ".stp"):
+        return write(path, step_boxes({"low": ((0, 0, 0), (1, 2, 3))}))
+    if ending == ".3mf":
+        return zipped(folder, model_3mf(object_3mf(1, LOW), '<item objectid="1"/>'))
+    if ending == ".urdf":
+        return write(path, robot(shape='<box size="1 2 3"/>').replace("0 0 1", "0 0 9"))
+    if ending == ".xmpuzzle":
+        cells = PUZZLE.format(grid="0", cells="#" * 6, solution="<solution><assembly>0 0 0 0</assembly></solution>")
+        return write(path, cells.replace('x="2" y="1" z="1"', 'x="1" y="2" z="3"').replace('count="2"', 'count="1"'))
+    if ending == ".json":
+        ns.Assembly.from_meshes({"low": LOW}).save(path)
+        return path
+    return write(path, mesh(LOW).export(file_type=ending[1:]) if ending != ".gltf" else json.dumps(gltf(stretch)))
+
+
+def stretch(tree: dict) -> None:
+    tree["nodes"][0]["scale"] = [1, 2, 3]
+
+
+@pytest.mark.parametrize("ending", sorted(_READERS))
+def test_each_kind_of_file_has_the_right_volume_and_size(ending: str, tmp_path: Path):
+    if ending in (".step", ".stp"):
+        pytest.importorskip("cascadio")
+    assembly = ns.Assembly.load(box_as(ending, tmp_path), up="z" if ending in (".glb", ".gltf") else None)
+    assert volume(*body_mesh(assembly, 0)) == pytest.approx(6)
+    low, high = assembly.bodies.part_bounds[0]
+    np.testing.assert_allclose(high - low, [1, 2, 3], atol=1e-6)
 
 
 @pytest.mark.parametrize("ending", ["obj", "stl", "ply", "off"])

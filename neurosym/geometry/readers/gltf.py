@@ -1,7 +1,8 @@
 """glTF 2.0 and GLB: a part for each node that bears a mesh, named after the node. Lengths are metres.
 
-Read here, field by field, because a scene decides which files are opened and how much memory is asked for. What only
-looks (materials, cameras, animations) is passed over.
+Read here, field by field, because a scene decides which files are opened and how much memory is asked for; trimesh takes
+cut-off, compressed and circular scenes for whole ones, and loses instances and sparse arrays. What only looks (materials,
+cameras, animations) is passed over.
 
 glTF says that y is up. Files that trimesh wrote hold coordinates as they were, mostly with z up, and say so by their
 `generator`; theirs are taken as they are, all others are turned so that z is up.
@@ -18,6 +19,7 @@ from urllib.parse import unquote
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from neurosym.errors import AssemblyError
 from neurosym.geometry.notes import Note
@@ -237,15 +239,7 @@ def _motion(node: Mapping[str, Any]) -> Array:
     if "matrix" in node:
         return np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T
     X = np.eye(4)
-    x, y, z, w = np.array(node.get("rotation", (0, 0, 0, 1)), dtype=np.float64)
-    n = x * x + y * y + z * z + w * w
-    X[:3, :3] = np.eye(3) + 2 / n * np.array(
-        [
-            [-y * y - z * z, x * y - z * w, x * z + y * w],
-            [x * y + z * w, -x * x - z * z, y * z - x * w],
-            [x * z - y * w, y * z + x * w, -x * x - y * y],
-        ]
-    )
+    X[:3, :3] = Rotation.from_quat(np.array(node.get("rotation", (0, 0, 0, 1)), dtype=np.float64)).as_matrix()
     X[:3, :3] *= np.array(node.get("scale", (1, 1, 1)), dtype=np.float64).reshape(3)
     X[:3, 3] = np.array(node.get("translation", (0, 0, 0)), dtype=np.float64).reshape(3)
     return X

@@ -9,10 +9,10 @@ import numpy as np
 
 from neurosym.errors import AssemblyError
 from neurosym.geometry.mesh.topology import signed_volume
-from neurosym.geometry.mesh.triangles import are_convex, area_vectors
+from neurosym.geometry.mesh.triangles import are_convex, are_inside, area_vectors
 from neurosym.geometry.shapes import Body, Box, Convex, Mesh, Part
 from neurosym.geometry.tolerances import Tolerances
-from neurosym.support.arrays import Array, Numbers, Truths, bounds
+from neurosym.support.arrays import Array, Numbers, bounds
 
 Triangles = tuple[Array, Numbers]
 
@@ -21,9 +21,6 @@ MAX_CELLS = 4_000
 
 #: Together more cells than this are no puzzle of unit cubes: a cuboid then is one box, any other shape a mesh.
 MAX_UNIT_CUBES = 1_000
-
-#: Where inside a cell (share of its edge) a ray is shot: off the diagonals and edges of the faces it crosses.
-_PROBE = np.array([0.5 + 0.1371, 0.5 + 0.0713, 0.5 + 0.0291])
 
 
 def as_triangles(name: str, mesh: Any) -> Triangles:
@@ -158,29 +155,9 @@ def _cells(local: Array, faces: Numbers, pitch: float) -> Numbers | None:
     offsets = (local - low) / pitch
     if np.abs(offsets - np.round(offsets)).max() > 0.01:
         return None
-    t = np.round(offsets)[faces]
-    e1, e2 = t[:, 1] - t[:, 0], t[:, 2] - t[:, 0]
-    area = e1[:, 0] * e2[:, 1] - e1[:, 1] * e2[:, 0]  # twice the signed shadow on the floor
-    lids = t[area != 0]
-    sign = np.sign(area[area != 0])
-    columns = np.stack(np.meshgrid(*map(np.arange, counts[:2]), indexing="ij"), axis=-1).reshape(-1, 2)
-    inside = _in_triangles(columns + _PROBE[:2], lids[..., :2])  # (columns, lids)
-    levels = np.arange(counts[2]) + _PROBE[2]
-    above = lids[None, :, 0, 2] > levels[:, None]  # (levels, lids)
-    winding = np.einsum("cl,zl,l->cz", inside.astype(float), above.astype(float), sign)
-    c, z = np.nonzero(np.round(winding) > 0)
-    if abs(len(c) - signed_volume(t.reshape(-1, 3), np.arange(3 * len(t)).reshape(-1, 3))) > 1e-6:
+    t: Array = np.round(offsets)[faces]
+    cells = np.stack(np.meshgrid(*map(np.arange, counts), indexing="ij"), axis=-1).reshape(-1, 3)
+    cells = cells[are_inside(np.add(cells, 0.5), t)]
+    if abs(len(cells) - signed_volume(t.reshape(-1, 3), np.arange(3 * len(t)).reshape(-1, 3))) > 1e-6:
         return None
-    return np.concatenate([columns[c], z[:, None]], axis=1)
-
-
-def _in_triangles(points: Array, triangles: Array) -> Truths:
-    """bool (n, m): which points (n, 2) lie in which triangles (m, 3, 2)."""
-    sides = []
-    for k in range(3):
-        a, b = triangles[:, k], triangles[:, (k + 1) % 3]
-        d = points[:, None] - a[None]
-        e = b - a
-        sides.append(e[None, :, 0] * d[..., 1] - e[None, :, 1] * d[..., 0])
-    stacked = np.stack(sides)
-    return np.asarray((stacked > 0).all(axis=0) | (stacked < 0).all(axis=0))
+    return cells

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -55,9 +56,11 @@ def read_ply(path: Path) -> Contents:
         for element in elements:
             if element.properties and element.rows > len(body):
                 raise AssemblyError(f"Expected {element.rows:,} rows of {element.name} in {path}; it is too short.")
-        read = _text_rows if order is None else _binary_rows
+        take = _text(body) if order is None else _Binary(body, order)
         vertices, polygons, rounding = None, None, FLOAT64
-        for element, columns in read(body, elements, order or "<", path):
+        for element in elements:
+            known = take.table(element) if isinstance(take, _Binary) and element.rows and element.properties else None
+            columns = _rows(take, element, path) if known is None else known
             if element.name == "vertex":
                 vertices = np.stack([np.asarray(columns[k], dtype=np.float64) for k in ("x", "y", "z")], axis=1)
                 kinds = {p.type for p in element.properties if p.name in ("x", "y", "z")}
@@ -104,68 +107,54 @@ def _elements(head: list[list[str]], path: Path) -> tuple[str | None, list[_Elem
     return order, elements
 
 
-Rows = Iterator[tuple[_Element, dict[str, Any]]]
+#: So many values of a type, the next of those that were not yet taken.
+Take = Callable[[str, int], Sequence[Any] | NDArray[Any]]
 
 
-def _text_rows(body: bytes, elements: list[_Element], order: str, path: Path) -> Rows:
-    lines = iter(body.decode("ascii", errors="replace").splitlines())
-    for element in elements:
-        columns: dict[str, list[Any]] = {p.name: [] for p in element.properties}
-        for _ in range(element.rows if element.properties else 0):
-            words = next(lines, "").split()
-            at = 0
-            for p in element.properties:
-                size = 1 if p.count is None else int(words[at])
-                at += p.count is not None
-                found = words[at : at + size]
-                if len(found) != size:
-                    raise AssemblyError(f"Expected {element.rows} rows of {element.name} in {path}; one is cut off.")
-                columns[p.name].append(float(found[0]) if p.count is None else [int(w) for w in found])
-                at += size
-        yield element, columns
+def _text(body: bytes) -> Take:
+    words = iter(body.decode("ascii", errors="replace").split())
+    return lambda kind, size: [(float if kind[0] == "f" else int)(word) for word in islice(words, size)]
 
 
-def _binary_rows(body: bytes, elements: list[_Element], order: str, path: Path) -> Rows:
-    at = 0
-    for element in elements:
-        if not element.rows or not element.properties:
-            yield element, {p.name: [] for p in element.properties}
-            continue
-        row = _first_row(body, at, element, order)
-        table = None
-        if at + row.itemsize * element.rows <= len(body):
-            # As if all lists were as long as the first: so it is where all faces are triangles.
-            table = np.frombuffer(body, row, element.rows, at)
-            if any((table[n] != table[n][0]).any() for n in row.names or () if n.startswith("#")):
-                table = None
-        if table is not None:
-            at += row.itemsize * element.rows
-            yield element, {p.name: table[p.name] for p in element.properties}
-        else:
-            columns, at = _row_by_row(body, at, element, order)
-            yield element, columns
+class _Binary:
+    """Bytes in the order "<" or ">"; `at`: how many were taken."""
 
+    def __init__(self, body: bytes, order: str) -> None:
+        self.body, self.order, self.at = body, order, 0
 
-def _first_row(body: bytes, at: int, element: _Element, order: str) -> np.dtype[Any]:
-    fields: list[Any] = []
-    for p in element.properties:
-        if p.count is None:
-            fields.append((p.name, order + p.type))
-            continue
-        size = int(np.frombuffer(body, order + p.count, 1, at + np.dtype(fields).itemsize)[0])
-        fields += [("#" + p.name, order + p.count), (p.name, order + p.type, (size,))]
-    return np.dtype(fields)
+    def __call__(self, kind: str, size: int) -> NDArray[Any]:
+        values: NDArray[Any] = np.frombuffer(self.body, self.order + kind, size, self.at)
+        self.at += values.nbytes
+        return values
 
-
-def _row_by_row(body: bytes, at: int, element: _Element, order: str) -> tuple[dict[str, list[NDArray[Any]]], int]:
-    columns: dict[str, list[NDArray[Any]]] = {p.name: [] for p in element.properties}
-    for _ in range(element.rows):
+    def table(self, element: _Element) -> dict[str, Any] | None:
+        """All rows at once, if all lists are as long as in the first row: so it is where all faces are triangles."""
+        fields: list[Any] = []
         for p in element.properties:
-            size = 1
             if p.count is not None:
-                size = int(np.frombuffer(body, order + p.count, 1, at)[0])
-                at += np.dtype(p.count).itemsize
-            values = np.frombuffer(body, order + p.type, size, at)
+                size = int(np.frombuffer(self.body, self.order + p.count, 1, self.at + np.dtype(fields).itemsize)[0])
+                fields += [("#" + p.name, self.order + p.count), (p.name, self.order + p.type, (size,))]
+            else:
+                fields.append((p.name, self.order + p.type))
+        row = np.dtype(fields)
+        if self.at + row.itemsize * element.rows > len(self.body):
+            return None
+        table = np.frombuffer(self.body, row, element.rows, self.at)
+        if any(
+            (table["#" + p.name] != table["#" + p.name][0]).any() for p in element.properties if p.count is not None
+        ):
+            return None
+        self.at += row.itemsize * element.rows
+        return {p.name: table[p.name] for p in element.properties}
+
+
+def _rows(take: Take, element: _Element, path: Path) -> dict[str, list[Any]]:
+    columns: dict[str, list[Any]] = {p.name: [] for p in element.properties}
+    for _ in range(element.rows if element.properties else 0):
+        for p in element.properties:
+            size = 1 if p.count is None else int(take(p.count, 1)[0])
+            values = take(p.type, size)
+            if len(values) != size:
+                raise AssemblyError(f"Expected {element.rows} rows of {element.name} in {path}; one is cut off.")
             columns[p.name].append(values if p.count is not None else values[0])
-            at += values.nbytes
-    return columns, at
+    return columns
