@@ -49,10 +49,10 @@ def without_repeats(faces: Numbers, *, cancel: bool = True) -> Numbers:
     start = np.argmin(faces, axis=1)
     one, two, three = (faces[np.arange(len(faces)), (start + k) % 3] for k in range(3))
     group, first = alike(np.stack([one, np.minimum(two, three), np.maximum(two, three)], axis=1))
-    ways = np.zeros((len(first), 2), dtype=bool)
-    ways[group, (two < three).astype(int)] = True
+    windings = np.zeros((len(first), 2), dtype=bool)
+    windings[group, (two < three).astype(int)] = True
     kept = np.zeros(len(faces), dtype=bool)
-    kept[first] = ~(cancel & ways.all(axis=1))
+    kept[first] = ~(cancel & windings.all(axis=1))
     return faces[kept]
 
 

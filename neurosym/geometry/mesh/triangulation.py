@@ -24,21 +24,21 @@ def triangulate(vertices: Array, polygons: Iterable[Sequence[int] | Numbers]) ->
     Returns:
         int64 (m, 3), the sum of k - 2 triangles, wound as the polygons are.
     """
-    found: list[Numbers] = []
+    triangles: list[Numbers] = []
     by_size: dict[int, list[Sequence[int] | Numbers]] = {}
     for polygon in polygons:
         by_size.setdefault(len(polygon), []).append(polygon)
     for size, alike in sorted(by_size.items()):
         same = np.array(alike, dtype=np.int64)
         if size == 3:
-            found.append(same)
+            triangles.append(same)
             continue
         same = _turned(same, vertices)
         convex = _are_convex(vertices[same])
         fan = np.stack([np.zeros(size - 2, dtype=np.int64), np.arange(1, size - 1), np.arange(2, size)], axis=1)
-        found.append(same[convex][:, fan].reshape(-1, 3))
-        found.extend(polygon[_ears(vertices[polygon])] for polygon in same[~convex])
-    return np.concatenate(found) if found else np.zeros((0, 3), dtype=np.int64)
+        triangles.append(same[convex][:, fan].reshape(-1, 3))
+        triangles.extend(polygon[_ears(vertices[polygon])] for polygon in same[~convex])
+    return np.concatenate(triangles) if triangles else np.zeros((0, 3), dtype=np.int64)
 
 
 def _turned(polygons: Numbers, vertices: Array) -> Numbers:

@@ -185,11 +185,11 @@ def _body(at: str, given: Any) -> Body:
 
 
 def _each_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    found = dict(pairs)
-    if len(found) != len(pairs):
+    entries = dict(pairs)
+    if len(entries) != len(pairs):
         keys = [k for k, _ in pairs]
         raise ValueError(f"{next(_brief(k) for k in keys if keys.count(k) > 1)} comes twice in one object")
-    return found
+    return entries
 
 
 def _no_constant(name: str) -> float:
@@ -230,20 +230,20 @@ def _number(at: str, value: Any, *, low: float = -np.inf, above: float = -np.inf
     except OverflowError:
         number = np.inf
     if not np.isfinite(number) or number < low or number <= above:
-        said = f"above {above:g}" if above > -np.inf else f"{low:g} or more" if low > -np.inf else "a finite number"
-        raise _Odd(f"{at} is {_brief(value)}, expected {said}")
+        expected = f"above {above:g}" if above > -np.inf else f"{low:g} or more" if low > -np.inf else "a finite number"
+        raise _Odd(f"{at} is {_brief(value)}, expected {expected}")
     return number
 
 
 def _array(at: str, value: Any, shape: tuple[int | None, ...]) -> Array:
-    said = f"numbers of shape ({', '.join('n' if n is None else str(n) for n in shape)})"
+    expected = f"numbers of shape ({', '.join('n' if n is None else str(n) for n in shape)})"
     try:
         array = np.array(value)
     except (ValueError, TypeError, OverflowError):
-        raise _Odd(f"{at} is {_brief(value)}, expected {said}") from None
+        raise _Odd(f"{at} is {_brief(value)}, expected {expected}") from None
     fits = array.ndim == len(shape) and all(n is None or n == m for n, m in zip(shape, array.shape)) and array.size > 0
     if not fits or array.dtype.kind not in "if" or not np.isfinite(array).all():
-        raise _Odd(f"{at} is {_brief(value)}, expected {said}")
+        raise _Odd(f"{at} is {_brief(value)}, expected {expected}")
     return array.astype(np.float64)
 
 

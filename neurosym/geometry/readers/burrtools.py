@@ -33,11 +33,11 @@ _ORIENTATIONS = (
 
 def rotations() -> Numbers:
     """int64 (24, 3, 3): the rotation matrices by number."""
-    found = np.zeros((24, 3, 3), dtype=np.int64)
+    matrices = np.zeros((24, 3, 3), dtype=np.int64)
     for number, word in enumerate(_ORIENTATIONS):
         for row in range(3):
-            found[number, row, "xyz".index(word[2 * row + 1])] = 1 if word[2 * row] == "+" else -1
-    return found
+            matrices[number, row, "xyz".index(word[2 * row + 1])] = 1 if word[2 * row] == "+" else -1
+    return matrices
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,14 +88,14 @@ def _chosen(among: list[Any], number: int, what: str, path: Path) -> Any:
 
 def _pieces(problem: Any, voxels: list[Any], path: Path) -> list[tuple[str, _Shape]]:
     """The pieces in the order in which a solution places them, each with a name of its own."""
-    found: list[tuple[str, _Shape]] = []
+    pieces: list[tuple[str, _Shape]] = []
     for entry in problem.findall("shapes/shape"):
         number = int(entry.attrib["id"])
         shape = _shape(voxels[number], number, path)
         count = int(entry.get("count", entry.get("max", "1")))
-        within_limits(path, 0, parts=len(found) + count)
-        found += [(shape.name if count == 1 else f"{shape.name}.{k + 1}", shape) for k in range(count)]
-    return found
+        within_limits(path, 0, parts=len(pieces) + count)
+        pieces += [(shape.name if count == 1 else f"{shape.name}.{k + 1}", shape) for k in range(count)]
+    return pieces
 
 
 def _shape(voxel: Any, number: int, path: Path) -> _Shape:
@@ -127,8 +127,8 @@ def _placed(pieces: list[tuple[str, _Shape]], words: list[str], path: Path) -> C
             raise AssemblyError(f"Expected orientations 0 to {len(R) - 1} in {path}; piece {name!r} has {t}.")
         cells[name] = np.array([x, y, z]) + shape.cells @ R[t].T
         if shape.variable:
-            said = f"Part {name!r} has {shape.variable} variable cells, which were taken as filled."
-            notes.append(Note(name, "variable", shape.variable, said))
+            sentence = f"Part {name!r} has {shape.variable} variable cells, which were taken as filled."
+            notes.append(Note(name, "variable", shape.variable, sentence))
     if at != len(words):
         raise AssemblyError(f"Expected placements of {len(pieces)} pieces in {path}; got {len(words)} numbers.")
     if sum(map(len, cells.values())) > MAX_CELLS:

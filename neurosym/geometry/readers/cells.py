@@ -36,8 +36,8 @@ def parts_from_cells(cells: Mapping[str, Iterable[Sequence[int]]], size: float) 
         for cell in triples:
             if cell in owner:
                 other = owner[cell]
-                said = "comes twice" if other == name else f"belongs to {other!r} too: the parts overlap"
-                raise AssemblyError(f"Part {name!r}: the cell {cell} {said}. Give each cell to one part, once.")
+                fault = "comes twice" if other == name else f"belongs to {other!r} too: the parts overlap"
+                raise AssemblyError(f"Part {name!r}: the cell {cell} {fault}. Give each cell to one part, once.")
             owner[cell] = name
         parts.append(boxes_part(name, (np.array(triples) + 0.5) * size, np.full(3, size)))
     return tuple(parts)

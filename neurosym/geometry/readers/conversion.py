@@ -32,16 +32,16 @@ def in_units(contents: Contents, wanted: str | None, source: Path) -> tuple[Cont
     known = None if contents.units is None else unit(contents.units)
     if known is None:
         if wanted is None:
-            said = f"{source.name} does not say what its lengths are in, and nothing was assumed."
-            return contents, [Note("", "units", 0.0, said, "State the unit (units=, --units) if it matters.")]
+            sentence = f"{source.name} does not say what its lengths are in, and nothing was assumed."
+            return contents, [Note("", "units", 0.0, sentence, "State the unit (units=, --units) if it matters.")]
         return replace(contents, units=wanted), []
     times = factor(known, wanted or known)
     if times == 1.0:
         return replace(contents, units=known), []
     parts = tuple(_scaled(part, times) for part in contents.parts)
     table = None if contents.table is None else contents.table * times
-    said = f"{source.name} is in {known}: its lengths were multiplied by {times:g}, to be in {wanted}."
-    return replace(contents, parts=parts, table=table, units=wanted), [Note("", "units", times, said)]
+    sentence = f"{source.name} is in {known}: its lengths were multiplied by {times:g}, to be in {wanted}."
+    return replace(contents, parts=parts, table=table, units=wanted), [Note("", "units", times, sentence)]
 
 
 def _scaled(part: RawMesh | Part, times: float) -> RawMesh | Part:

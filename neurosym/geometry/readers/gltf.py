@@ -1,8 +1,8 @@
 """glTF 2.0 and GLB: a part for each node that bears a mesh, named after the node. Lengths are metres.
 
-Read here, field by field, because a scene decides which files are opened and how much memory is asked for; trimesh takes
-cut-off, compressed and circular scenes for whole ones, and loses instances and sparse arrays. What only looks (materials,
-cameras, animations) is passed over.
+Read here, field by field, because a scene decides which files are opened and how much memory is asked for; trimesh
+takes cut-off, compressed and circular scenes for whole ones, and loses instances and sparse arrays. What only looks
+(materials, cameras, animations) is passed over.
 
 glTF says that y is up. Files that trimesh wrote hold coordinates as they were, mostly with z up, and say so by their
 `generator`; theirs are taken as they are, all others are turned so that z is up.
@@ -50,8 +50,8 @@ def read_gltf(path: Path, *, up: str | None = None) -> Contents:
     with limits.reading("glTF 2.0", path):
         scene = open_gltf(limits.read_bytes(path), path)
         up = up or ("z" if "trimesh" in str(scene.tree["asset"].get("generator", "")) else "y")
-        said = "y is up, as glTF has it: turned so that z is" if up == "y" else "z is taken to be up, unturned"
-        note = Note("", "axes", 0.0, f"{path.name}: {said}.", "Load it with up='z' or up='y' if that is wrong.")
+        sentence = "y is up, as glTF has it: turned so that z is" if up == "y" else "z is taken to be up, unturned"
+        note = Note("", "axes", 0.0, f"{path.name}: {sentence}.", "Load it with up='z' or up='y' if that is wrong.")
         parts = scene.parts(Y_UP if up == "y" else np.eye(4))
         return Contents(tuple(parts), "m", notes=(note, *scene.notes))
 
@@ -72,15 +72,15 @@ def _chunks(data: bytes, path: Path) -> tuple[bytes, bytes | None]:
         raise AssemblyError(
             f"Expected GLB of version 2 and of {length:,} bytes in {path}; got version {version}, {len(data):,} bytes."
         )
-    found: dict[bytes, bytes] = {}
+    chunks: dict[bytes, bytes] = {}
     at = 12
     while at + 8 <= length:
         size, kind = int(np.frombuffer(data, "<u4", 1, at)[0]), data[at + 4 : at + 8]
         if at + 8 + size > length:
             raise AssemblyError(f"Expected whole chunks in {path}; one is cut off. Export it again.")
-        found.setdefault(kind, data[at + 8 : at + 8 + size])
+        chunks.setdefault(kind, data[at + 8 : at + 8 + size])
         at += 8 + size
-    return found[b"JSON"], found.get(b"BIN\0")
+    return chunks[b"JSON"], chunks.get(b"BIN\0")
 
 
 class Scene:
@@ -105,7 +105,7 @@ class Scene:
         else:
             children = {child for node in nodes for child in node.get("children", [])}
             roots = [i for i in range(len(nodes)) if i not in children]
-        found: list[RawMesh] = []
+        parts: list[RawMesh] = []
         total, seen = 0, set()
         stack = [(i, root) for i in reversed(roots)]
         while stack:
@@ -124,12 +124,12 @@ class Scene:
             mesh = united(str(node.get("name") or self.tree["meshes"][node["mesh"]].get("name") or ""), pieces, FLOAT32)
             for Y in self._instances(node):
                 total += len(mesh.faces)
-                limits.within_limits(self.path, len(mesh.faces), total, len(found) + 1)
+                limits.within_limits(self.path, len(mesh.faces), total, len(parts) + 1)
                 place = X @ Y
                 # A mirrored copy has its faces inside out.
                 faces = mesh.faces if np.linalg.det(place[:3, :3]) > 0 else mesh.faces[:, ::-1]
-                found.append(RawMesh(mesh.name, mesh.vertices @ place[:3, :3].T + place[:3, 3], faces, FLOAT32))
-        return found
+                parts.append(RawMesh(mesh.name, mesh.vertices @ place[:3, :3].T + place[:3, 3], faces, FLOAT32))
+        return parts
 
     def _instances(self, node: Mapping[str, Any]) -> Iterable[Array]:
         """Where the mesh of a node is put, in the node's frame: once, or as often as EXT_mesh_gpu_instancing says."""
@@ -152,8 +152,8 @@ class Scene:
                     others += 1
             if others:
                 name = mesh.get("name", number)
-                said = f"{self.path.name}: {others} sets of points or lines in the mesh {name!r} were left out."
-                self.notes.append(Note("", "skipped", others, said))
+                sentence = f"{self.path.name}: {others} sets of points or lines in the mesh {name!r} were left out."
+                self.notes.append(Note("", "skipped", others, sentence))
             self._meshes[number] = pieces
         return self._meshes[number]
 

@@ -249,6 +249,6 @@ def _wrong(part: Part) -> list[Note]:
         if isinstance(body.shape, Convex) and not triangles.are_convex(
             body.shape.vertices, body.shape.faces, 1e-6 * extent
         ):
-            said = f"Part {part.name!r} has a body that is said to be convex and is not."
-            faults.append(Note(part.name, "convex", 0.0, said, "Give it as a mesh."))
+            sentence = f"Part {part.name!r} has a body that is said to be convex and is not."
+            faults.append(Note(part.name, "convex", 0.0, sentence, "Give it as a mesh."))
     return faults

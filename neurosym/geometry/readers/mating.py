@@ -47,9 +47,9 @@ def mating_tolerances(
     a, b = (bodies.parts[i].name for i in pair)
     touch = max(min(ABOVE * share, WIDEST), 1.01 * share)
     pairs = "one pair of parts" if len(slight) == 1 else f"{len(slight)} pairs of parts"
-    said = f"Mating faces of {pairs} overlap, by up to {depth:.4g} between {a!r} and {b!r}; "
-    said += f"overlaps up to {touch * smallest:.4g} ({touch:.2g} of the smallest extent) are taken for touch."
-    return replace(tolerances, touch=touch), [Note(a, "mating", depth, said, other=b)], faults
+    sentence = f"Mating faces of {pairs} overlap, by up to {depth:.4g} between {a!r} and {b!r}; "
+    sentence += f"overlaps up to {touch * smallest:.4g} ({touch:.2g} of the smallest extent) are taken for touch."
+    return replace(tolerances, touch=touch), [Note(a, "mating", depth, sentence, other=b)], faults
 
 
 def _too_deep(bodies: Bodies, i: int, j: int, depth: float, limit: float) -> Note:
@@ -58,14 +58,14 @@ def _too_deep(bodies: Bodies, i: int, j: int, depth: float, limit: float) -> Not
     corners = [np.concatenate([bodies.vertices(int(k)) for k in np.flatnonzero(bodies.owners == n)]) for n in (i, j)]
     apart = max(cKDTree(u).query(v)[0].max() for u, v in (corners, corners[::-1]))
     if apart <= DEFAULT_TOLERANCES.touch * bodies.smallest_extent:
-        said = f"Parts {a!r} and {b!r} are the same solid in the same place."
-        return Note(a, "overlap", depth, said, "Take one of them away.", b)
-    said = f"Parts {a!r} and {b!r} overlap by {depth:.4g}, {share:.2g} of the smallest extent of any part; "
+        sentence = f"Parts {a!r} and {b!r} are the same solid in the same place."
+        return Note(a, "overlap", depth, sentence, "Take one of them away.", b)
+    sentence = f"Parts {a!r} and {b!r} overlap by {depth:.4g}, {share:.2g} of the smallest extent of any part; "
     remedy = "Move them apart."
     if 1.1 * share <= MAX_TOUCH:
         remedy = f"Move them apart; if they are meant to mate so, state Tolerances(touch={1.1 * share:.2g}), "
         remedy += "--touch on the command line."
-    return Note(a, "overlap", depth, said + f"mating faces may by {limit:g} of it.", remedy, b)
+    return Note(a, "overlap", depth, sentence + f"mating faces may by {limit:g} of it.", remedy, b)
 
 
 def floating(surfaces: BodySurfaces, fixed: int, ground: float, touch: float) -> list[Note]:

@@ -56,7 +56,7 @@ class Examined:
     faults: tuple[Note, ...]
 
 
-class _Findings:
+class _Report:
     """Notes and faults of one part, gathered while it is looked at."""
 
     def __init__(self, part: str) -> None:
@@ -77,51 +77,52 @@ def examine(mesh: RawMesh) -> Examined:
     Args:
         mesh: as read; its name is the part's.
     """
-    found = _Findings(mesh.name)
+    report = _Report(mesh.name)
     vertices, faces = np.asarray(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces, dtype=np.int64)
-    if _can_be_measured(vertices, faces, mesh.rounding, found):
-        vertices, faces = _closed(vertices, faces, found)
-        if not found.faults:
-            faces = _outward(vertices, faces, found)
-        if not found.faults:
-            _look_for_crossings(vertices, faces, found)
-    return Examined(vertices, faces, tuple(found.notes), tuple(found.faults))
+    if _can_be_measured(vertices, faces, mesh.rounding, report):
+        vertices, faces = _closed(vertices, faces, report)
+        if not report.faults:
+            faces = _outward(vertices, faces, report)
+        if not report.faults:
+            _look_for_crossings(vertices, faces, report)
+    return Examined(vertices, faces, tuple(report.notes), tuple(report.faults))
 
 
-def _can_be_measured(vertices: Array, faces: Numbers, rounding: float, found: _Findings) -> bool:
+def _can_be_measured(vertices: Array, faces: Numbers, rounding: float, report: _Report) -> bool:
     if not len(vertices) or not len(faces):
-        found.fault("empty", 0, "is empty: it has no faces", "Take the file away, or export the part again.")
+        report.fault("empty", 0, "is empty: it has no faces", "Take the file away, or export the part again.")
         return False
     if len(faces) > MAX_FACES:
-        found.fault("empty", len(faces), f"has {len(faces):,} faces, more than {MAX_FACES:,}", "Simplify the mesh.")
+        report.fault("empty", len(faces), f"has {len(faces):,} faces, more than {MAX_FACES:,}", "Simplify the mesh.")
         return False
     if faces.min() < 0 or faces.max() >= len(vertices):
-        found.fault(
+        report.fault(
             "index", faces.max(), f"has faces that index more than its {len(vertices)} vertices", "Export it again."
         )
         return False
     corners = vertices[topology.in_use(vertices, faces)]
     if not np.isfinite(corners).all():
         bad = int((~np.isfinite(corners)).any(axis=1).sum())
-        found.fault("nan", bad, f"has {bad} vertices that are NaN or infinite", "Export the part again.")
+        report.fault("nan", bad, f"has {bad} vertices that are NaN or infinite", "Export the part again.")
         return False
     with np.errstate(over="ignore"):
         reach = extents(corners)
     if not SMALLEST <= reach.max() <= LARGEST:
-        said = f"is {reach.max():g} long, expected {SMALLEST:g} to {LARGEST:g}"
-        found.fault("flat" if reach.max() < SMALLEST else "far", reach.max(), said, "Use another unit of length.")
+        sentence = f"is {reach.max():g} long, expected {SMALLEST:g} to {LARGEST:g}"
+        kind = "flat" if reach.max() < SMALLEST else "far"
+        report.fault(kind, reach.max(), sentence, "Use another unit of length.")
         return False
     away = float(np.abs(corners).max())
     step = 2 * away * rounding
     thin = float(reach[reach > SMALLEST].min())
     if step > DEFAULT_TOLERANCES.touch * thin / 4:
-        said = f"lies {away:g} from the origin, where coordinates come in steps of {step:.2g}; it is {thin:g} thin"
-        found.fault("far", away, said, "Move the assembly to the origin before exporting it.")
+        sentence = f"lies {away:g} from the origin, where coordinates come in steps of {step:.2g}; it is {thin:g} thin"
+        report.fault("far", away, sentence, "Move the assembly to the origin before exporting it.")
         return False
     return True
 
 
-def _closed(vertices: Array, faces: Numbers, found: _Findings) -> tuple[Array, Numbers]:
+def _closed(vertices: Array, faces: Numbers, report: _Report) -> tuple[Array, Numbers]:
     """The mesh with its vertices merged, its faces of no area dropped, wound one way; faults where it is open."""
     given = len(faces)
     extent = float(extents(vertices[topology.in_use(vertices, faces)]).max())
@@ -134,38 +135,39 @@ def _closed(vertices: Array, faces: Numbers, found: _Findings) -> tuple[Array, N
         turned = topology.same_winding(once) if len(once) > len(faces) else None
         left = 0 if turned is None else len(topology.open_edges(turned)[0])
         if turned is not None and not left:
-            found.note("doubled", len(once), "had faces twice, wound both ways, as if hollow; each was taken once")
+            report.note("doubled", len(once), "had faces twice, wound both ways, as if hollow; each was taken once")
             return vertices, turned if topology.signed_volume(vertices, turned) > 0 else turned[:, ::-1]
         if not len(faces):
-            said = f"its faces cancel, and taken once leave {left} edges open" if left else "its faces are lines"
-            found.fault("flat", left, f"encloses nothing: {said}", "Give it a thickness, or close it.")
+            sentence = f"its faces cancel, and taken once leave {left} edges open" if left else "its faces are lines"
+            report.fault("flat", left, f"encloses nothing: {sentence}", "Give it a thickness, or close it.")
             return vertices, faces
     elif len(vertices) < len(exact) and len(topology.open_edges(topology.without_repeats(joined))[0]):
-        found.note("merged", len(exact) - len(vertices), f"has corners up to {MERGE * extent:.2g} apart made one")
+        report.note("merged", len(exact) - len(vertices), f"has corners up to {MERGE * extent:.2g} apart made one")
     if len(faces) < given:
         dropped = given - len(faces)
-        said = f"had {dropped} faces of no area, given twice or back to back, which were dropped"
-        found.note("degenerate", dropped, said)
+        sentence = f"had {dropped} faces of no area, given twice or back to back, which were dropped"
+        report.note("degenerate", dropped, sentence)
     if winding:
         turned = topology.same_winding(faces)
         if turned is None:
-            found.fault("open", len(half), "is one-sided, like a Moebius strip", "Export the part as a solid.")
+            report.fault("open", len(half), "is one-sided, like a Moebius strip", "Export the part as a solid.")
             return vertices, faces
         changed = int((turned != faces).any(axis=1).sum())
-        found.note("winding", min(changed, len(faces) - changed), "had faces wound both ways, which were turned")
+        report.note("winding", min(changed, len(faces) - changed), "had faces wound both ways, which were turned")
         faces = turned
         half, _ = topology.open_edges(faces)
     if len(half):
         if topology.closes_at_junctions(vertices, faces, MERGE * extent):
-            said = f"has {len(half)} edges that meet others halfway; it is closed all the same"
-            found.note("t-junction", len(half), said)
+            sentence = f"has {len(half)} edges that meet others halfway; it is closed all the same"
+            report.note("t-junction", len(half), sentence)
         else:
-            said = f"is open: {len(half)} edges have a face on one side only"
-            found.fault("open", len(half), said, "Fill the holes (trimesh.repair.fill_holes), or export it as a solid.")
+            sentence = f"is open: {len(half)} edges have a face on one side only"
+            remedy = "Fill the holes (trimesh.repair.fill_holes), or export it as a solid."
+            report.fault("open", len(half), sentence, remedy)
     return vertices, faces
 
 
-def _outward(vertices: Array, faces: Numbers, found: _Findings) -> Numbers:
+def _outward(vertices: Array, faces: Numbers, report: _Report) -> Numbers:
     """The faces turned so that each shell is a solid, or a cavity in one."""
     shells = topology.shells_of(faces)
     volumes = topology.shell_volumes(vertices, faces, shells)
@@ -174,7 +176,7 @@ def _outward(vertices: Array, faces: Numbers, found: _Findings) -> Numbers:
     total = float(volumes.sum())
     if 2 * np.abs(volumes).sum() <= FLAT * extent * area or abs(total) <= FLAT * extent * area / 2:
         remedy = "Give it a thickness, or wind its faces one way."
-        found.fault("flat", total, f"encloses no volume ({total:.2g})", remedy)
+        report.fault("flat", total, f"encloses no volume ({total:.2g})", remedy)
         return faces
     turned = np.full(len(volumes), total < 0)
     if 1 < len(volumes) <= MAX_SHELLS and topology.closed_shells(faces) is not None:
@@ -186,23 +188,23 @@ def _outward(vertices: Array, faces: Numbers, found: _Findings) -> Numbers:
         faces = faces.copy()
         which = turned[shells]
         faces[which] = faces[which][:, ::-1]
-        found.note("inverted", total, f"was inside out (volume {total:.4g}); its faces were turned")
+        report.note("inverted", total, f"was inside out (volume {total:.4g}); its faces were turned")
     return faces
 
 
-def _look_for_crossings(vertices: Array, faces: Numbers, found: _Findings) -> None:
+def _look_for_crossings(vertices: Array, faces: Numbers, report: _Report) -> None:
     margin = CROSSING * float(extents(vertices).min())
     folds = _folds(vertices, faces, margin)
     if folds:
-        said = f"crosses itself: {folds} pairs of neighbouring faces are folded onto one another"
-        found.fault("self-intersecting", folds, said, "Cut its polygons into triangles before exporting it.")
+        sentence = f"crosses itself: {folds} pairs of neighbouring faces are folded onto one another"
+        report.fault("self-intersecting", folds, sentence, "Cut its polygons into triangles before exporting it.")
         return
     if triangles.are_convex(vertices, faces, margin):
         return
     pairs = triangles.crossing_pairs(vertices, faces, margin)
     shells = topology.shells_of(faces)
     if not len(pairs):
-        _look_for_nested(vertices, faces, found)
+        _look_for_nested(vertices, faces, report)
         return
     i, j = pairs.T
     within = shells[i] == shells[j]
@@ -211,15 +213,15 @@ def _look_for_crossings(vertices: Array, faces: Numbers, found: _Findings) -> No
     where = vertices[faces[i[which][0]]].mean(axis=0)
     at = f"{count} pairs of faces, one near ({', '.join(f'{x:.4g}' for x in where)})"
     if within.any():
-        found.fault(
+        report.fault(
             "self-intersecting", count, f"crosses itself: {at}", "Mend it (a boolean union of it with nothing does)."
         )
     else:
-        said = f"is made of solids that overlap: {at}; its volume counts the overlap twice"
-        found.note("self-intersecting", count, said, UNITE)
+        sentence = f"is made of solids that overlap: {at}; its volume counts the overlap twice"
+        report.note("self-intersecting", count, sentence, UNITE)
 
 
-def _look_for_nested(vertices: Array, faces: Numbers, found: _Findings) -> None:
+def _look_for_nested(vertices: Array, faces: Numbers, report: _Report) -> None:
     shells = topology.closed_shells(faces)
     if shells is None or shells.max() == 0:
         return
@@ -228,11 +230,11 @@ def _look_for_nested(vertices: Array, faces: Numbers, found: _Findings) -> None:
     nested = False
     for k in solids if len(volumes) <= MAX_SHELLS else ():
         if triangles.are_inside(vertices[faces[shells == k][:1]].mean(axis=1), vertices[faces[shells != k]])[0]:
-            said = f"is made of solids inside one another; its volume counts {volumes[k]:.4g} twice"
-            found.note("self-intersecting", volumes[k], said, UNITE)
+            sentence = f"is made of solids inside one another; its volume counts {volumes[k]:.4g} twice"
+            report.note("self-intersecting", volumes[k], sentence, UNITE)
             nested = True
     if len(solids) > 1 and not nested:
-        found.note("solids", len(solids), f"is made of {len(solids)} solids side by side, which move as one")
+        report.note("solids", len(solids), f"is made of {len(solids)} solids side by side, which move as one")
 
 
 def _folds(vertices: Array, faces: Numbers, margin: float) -> int:

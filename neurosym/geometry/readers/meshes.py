@@ -73,7 +73,7 @@ def _common_grid(meshes: Mapping[str, Triangles], tolerances: Tolerances) -> dic
     pitch = _common_divisor(np.concatenate(spans))
     if pitch is None:
         return {}
-    found: dict[str, tuple[Body, ...]] = {}
+    boxes: dict[str, tuple[Body, ...]] = {}
     origin = local[fitting[0]][0].min(axis=0)
     cells = {name: _cells(vertices, faces, pitch) for name, (vertices, faces) in local.items()}
     many = sum(len(c) for c in cells.values() if c is not None) > MAX_UNIT_CUBES
@@ -95,8 +95,8 @@ def _common_grid(meshes: Mapping[str, Triangles], tolerances: Tolerances) -> dic
             X[:3, :3] = frame
             X[:3, 3] = middle + frame @ (low + centre * pitch)
             bodies.append(Body(Box(np.asarray(size, dtype=np.float64)), X))
-        found[name] = tuple(bodies)
-    return found
+        boxes[name] = tuple(bodies)
+    return boxes
 
 
 def _mean_frame(frame: Array, meshes: list[Triangles]) -> Array:

@@ -19,7 +19,7 @@ def distinct(names: Sequence[str], what: str = "part") -> tuple[list[str], list[
 
     A name that is given again gets " (2)", " (3)" and so on; an empty one becomes "part-7", counted from 1.
     """
-    found: list[str] = []
+    chosen: list[str] = []
     notes = []
     # Names that come once keep theirs, whatever the others turn into.
     plain = [_plain(name) or f"{what}-{number}" for number, name in enumerate(names, 1)]
@@ -36,8 +36,8 @@ def distinct(names: Sequence[str], what: str = "part") -> tuple[list[str], list[
             taken.add(name)
         if name != given:
             notes.append(Note(name, "name", 0.0, f"Part {name!r} is called {_brief(given)} in the file."))
-        found.append(name)
-    return found, notes
+        chosen.append(name)
+    return chosen, notes
 
 
 def _plain(name: str) -> str:

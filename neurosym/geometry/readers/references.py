@@ -68,9 +68,9 @@ class Reading:
             raise InputError(f"Expected {', '.join(given)} with the files of an assembly; {because}.")
 
     @classmethod
-    def from_json(cls, said: Mapping[str, Any]) -> Reading:
+    def from_json(cls, given: Mapping[str, Any]) -> Reading:
         """The inverse of `as_json`; other entries are not looked at."""
-        return cls(**{field.name: said.get(field.name) for field in fields(cls)})
+        return cls(**{field.name: given.get(field.name) for field in fields(cls)})
 
 
 def reference(path: Path, reading: Reading, assembly: Assembly) -> dict[str, Any]:
@@ -78,31 +78,31 @@ def reference(path: Path, reading: Reading, assembly: Assembly) -> dict[str, Any
     return {"path": str(path.resolve()), **reading.as_json(), "digest": digest(assembly)}
 
 
-def referenced(said: Any, beside: Path) -> Assembly:
+def referenced(given: Any, beside: Path) -> Assembly:
     """The assembly that `reference` spoke of: at its path, or by its name beside the file that mentions it.
 
     Raises:
         InputError: it is in neither place, or it is another one now.
     """
-    path = said.get("path") if isinstance(said, Mapping) else None
+    path = given.get("path") if isinstance(given, Mapping) else None
     if not isinstance(path, str):
-        raise InputError(f'Expected "assembly" in {beside} with the "path" of an assembly; got {said!r}.')
+        raise InputError(f'Expected "assembly" in {beside} with the "path" of an assembly; got {given!r}.')
     places = [Path(path), beside.parent / Path(path).name]
-    found = next((place for place in places if place.exists()), None)
-    if found is None:
+    place = next(filter(Path.exists, places), None)
+    if place is None:
         raise InputError(f"Expected the assembly of {beside} at {places[0]} or at {places[1]}; it is in neither place.")
-    assembly = Reading.from_json(said).load(found)
-    if said.get("digest") not in (None, digest(assembly)):
-        raise InputError(f"Expected the assembly that {beside} was planned for; {found} has changed since. Plan again.")
+    assembly = Reading.from_json(given).load(place)
+    if given.get("digest") not in (None, digest(assembly)):
+        raise InputError(f"Expected the assembly that {beside} was planned for; {place} has changed since. Plan again.")
     return assembly
 
 
 def digest(assembly: Assembly) -> str:
     """A fingerprint of names, shapes, poses and fixed parts."""
-    found = hashlib.sha256(repr((assembly.names, sorted(assembly.fixed), assembly.friction)).encode())
+    hashed = hashlib.sha256(repr((assembly.names, sorted(assembly.fixed), assembly.friction)).encode())
     for body, X, owner in zip(assembly.bodies, assembly.X_WB, assembly.owners):
-        found.update(int(owner).to_bytes(4, "little"))
+        hashed.update(int(owner).to_bytes(4, "little"))
         for array in (X, body.shape.vertices, body.shape.faces):
             # Rounded, so that the last bit of another machine's arithmetic does not count.
-            found.update(np.ascontiguousarray(np.round(array, 9) + 0.0).tobytes())
-    return found.hexdigest()
+            hashed.update(np.ascontiguousarray(np.round(array, 9) + 0.0).tobytes())
+    return hashed.hexdigest()

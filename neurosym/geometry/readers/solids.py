@@ -22,8 +22,8 @@ def by_name(path: Path, meshes: Sequence[RawMesh]) -> Contents:
         return Contents(tuple(meshes))
     one = united(path.stem, [(m.vertices, m.faces) for m in meshes], meshes[0].rounding)
     names = ", ".join(repr(m.name) for m in meshes[:5]) + (", ..." if len(meshes) > 5 else "")
-    said = f"None of the {len(meshes)} pieces of {path.name} ({names}) is closed by itself: they are one part."
-    return Contents((one,), notes=(Note("", "solids", len(meshes), said),))
+    sentence = f"None of the {len(meshes)} pieces of {path.name} ({names}) is closed by itself: they are one part."
+    return Contents((one,), notes=(Note("", "solids", len(meshes), sentence),))
 
 
 def _is_closed(mesh: RawMesh) -> bool:
@@ -62,23 +62,26 @@ def separated(mesh: RawMesh) -> list[RawMesh]:
     if not len(faces):
         return [mesh]
     apart, was = topology.unshared(faces, topology.closed_runs(faces))
+    if topology.shells_of(apart).max() == 0:
+        return [mesh]
     turned = topology.same_winding(apart)
     shells = None if turned is None else topology.closed_shells(turned)
-    if turned is None or shells is None or shells.max() == 0:
+    if turned is None or shells is None:
         return [mesh]
     points = vertices[was]
     volumes = topology.shell_volumes(points, turned, shells)
-    if np.abs(volumes).min() <= FLAT * extent**3:
+    areas = np.bincount(shells, weights=np.linalg.norm(triangles.area_vectors(points[turned]), axis=1))
+    if (2 * np.abs(volumes) <= FLAT * extent * areas).any():
         return [mesh]
     corners = points[np.where((volumes < 0)[shells, None], turned[:, ::-1], turned)]
     order = np.argsort(shells, kind="stable")
     solid = _solids(np.split(corners[order], np.cumsum(np.bincount(shells))[:-1]), np.abs(volumes))[shells]
-    found: list[RawMesh] = []
+    solids: list[RawMesh] = []
     for k in dict.fromkeys(solid.tolist()):
         own = points[apart[solid == k]]
-        name = f"{mesh.name}-{len(found) + 1}"
-        found.append(RawMesh(name, own.reshape(-1, 3), np.arange(3 * len(own)).reshape(-1, 3), mesh.rounding))
-    return found if len(found) > 1 else [mesh]
+        name = f"{mesh.name}-{len(solids) + 1}"
+        solids.append(RawMesh(name, own.reshape(-1, 3), np.arange(3 * len(own)).reshape(-1, 3), mesh.rounding))
+    return solids if len(solids) > 1 else [mesh]
 
 
 def _solids(shells: list[Array], volumes: Array) -> Numbers:

@@ -55,8 +55,8 @@ def _text(data: bytes, path: Path) -> list[tuple[str, Array]]:
     text = "\n".join(data.decode("utf-8", errors="replace").splitlines())
     starts = list(re.finditer(r"^[ \t]*solid\b(.*)$", text, re.MULTILINE | re.IGNORECASE))
     if not starts or text[: starts[0].start()].strip() or "endsolid" not in text[-1000:].lower():
-        said = f"{len(data):,} bytes fit no count of triangles, and no text from `solid` to `endsolid`"
-        raise AssemblyError(f"Expected STL in {path}; its {said}. It may be cut off: export it again.")
+        fault = f"{len(data):,} bytes fit no count of triangles, and no text from `solid` to `endsolid`"
+        raise AssemblyError(f"Expected STL in {path}; its {fault}. It may be cut off: export it again.")
     solids = []
     for start, end in zip(starts, [*(s.start() for s in starts[1:]), len(text)]):
         words = text[start.end() : end].split()

@@ -58,7 +58,7 @@ def read_3mf(path: Path) -> Contents:
         models: dict[str, _Model] = {}
         main = _root(archive, path)
         root = _model(archive, main, models, path)
-        found: list[RawMesh] = []
+        parts: list[RawMesh] = []
         left: list[str] = []
         total = 0
         # (model, object, transform, name, depth), the last on top.
@@ -73,16 +73,16 @@ def read_3mf(path: Path) -> Contents:
                 left.append(f"{name or number!r} ({thing.kind})")
                 continue
             stack += [(m or model, i, X @ Y, name, depth + 1) for m, i, Y in reversed(thing.components)]
-            within_limits(path, len(thing.faces), total, len(found) + len(stack))
+            within_limits(path, len(thing.faces), total, len(parts) + len(stack))
             if thing.components:
                 continue
             total += len(thing.faces)
             vertices = np.array(thing.vertices, dtype=np.float64).reshape(-1, 3) @ X[:3, :3].T + X[:3, 3]
             faces = np.array(thing.faces, dtype=np.int64).reshape(-1, 3)
             faces = faces if np.linalg.det(X[:3, :3]) > 0 else faces[:, ::-1]
-            found.append(RawMesh(name or f"object-{number}", vertices, faces))
-        said = f"{path.name}: {len(left)} objects that are no parts were left out: {', '.join(left[:5])}."
-        return Contents(tuple(found), root.unit, notes=(Note("", "skipped", len(left), said),) if left else ())
+            parts.append(RawMesh(name or f"object-{number}", vertices, faces))
+        sentence = f"{path.name}: {len(left)} objects that are no parts were left out: {', '.join(left[:5])}."
+        return Contents(tuple(parts), root.unit, notes=(Note("", "skipped", len(left), sentence),) if left else ())
 
 
 def _root(archive: zipfile.ZipFile, path: Path) -> str:

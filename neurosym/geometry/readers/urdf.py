@@ -87,8 +87,8 @@ def read_urdf(
         if seen != len(links):
             raise AssemblyError(f"Expected a tree of links in {path}; {len(links) - seen} of them hang on no base.")
         bare = [name for name in links if links[name].find(meshes) is None and links[name].find("inertial") is not None]
-        said = f"{path.name}: {len(bare)} links without a {meshes} shape were left out: {', '.join(bare[:5])}."
-        notes = (Note("", "skipped", len(bare), said),) if bare else ()
+        sentence = f"{path.name}: {len(bare)} links without a {meshes} shape were left out: {', '.join(bare[:5])}."
+        notes = (Note("", "skipped", len(bare), sentence),) if bare else ()
         return Contents(tuple(parts), "m", tuple(fixed), notes=notes, hint=HINT if meshes == "visual" else "")
 
 
