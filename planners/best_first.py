@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
 from itertools import islice
-from typing import Any
+from typing import Any, NamedTuple
 
 from neurosym.errors import InputError, UnknownNameError
 from neurosym.language.search_problem import Rejection
@@ -71,26 +71,17 @@ class _Node(Node):
     waiting: list[int] = field(default_factory=list)  # candidates not queued yet
 
 
-@dataclass(slots=True)
-class _Attempt:
-    """Waits in the queue: an action at a node."""
-
+class _Attempt(NamedTuple):
     node: _Node
     action: int
 
 
-@dataclass(slots=True)
-class _Siblings:
-    """Waits in the queue: all attempts at a node that have not been queued one by one."""
-
-    node: _Node
+class _Siblings(NamedTuple):
+    node: _Node  # all attempts here that have not been queued one by one
 
 
-@dataclass(slots=True)
-class _Goal:
-    """Waits in the queue: a plan."""
-
-    node: _Node
+class _Goal(NamedTuple):
+    node: _Node  # a plan that waits its turn
 
 
 class _BestFirst:

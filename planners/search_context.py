@@ -81,8 +81,10 @@ class SearchContext:
         """The completion, its first action exchanged for the interchangeable one of `options`; empty without one."""
         label = self.classes[completion[0]]
         first = next((a for a in options if self.classes[a] == label), None)
-        if first in (None, completion[0]):
-            return () if first is None else completion
+        if first is None:
+            return ()
+        if first == completion[0]:
+            return completion
         return (first, *(completion[0] if a == first else a for a in completion[1:]))
 
     def cost(self, step: int, action: int) -> float:
