@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
+from functools import cached_property
 
 from neurosym.language.search_problem import Rejection
 
@@ -12,12 +13,18 @@ class PreferredActions:
     """The actions that rejections wait for, and those whose `names` have one of their objects in them."""
 
     def __init__(self, names: Sequence[str]) -> None:
-        self._about: dict[str, list[int]] = {}
-        for action, name in enumerate(names):
+        self._names = tuple(names)
+        self._latest: list[int] = []
+
+    @cached_property
+    def _about(self) -> dict[str, list[int]]:
+        """Word -> the actions that have it in their names."""
+        about: dict[str, list[int]] = {}
+        for action, name in enumerate(self._names):
             for word in dict.fromkeys((name, *re.split(r"[\s(),]+", name))):
                 if word:
-                    self._about.setdefault(word, []).append(action)
-        self._latest: list[int] = []
+                    about.setdefault(word, []).append(action)
+        return about
 
     def learn(self, rejection: Rejection, used: int) -> None:
         """Put what the rejection names before all else, but for the actions in `used`."""
