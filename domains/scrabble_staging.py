@@ -9,6 +9,7 @@ import numpy as np
 
 from domains.scrabble_drawing import tile_face
 from neurosym.geometry.assembly import Assembly
+from neurosym.geometry.rigid_motions import shifted
 from neurosym.geometry.shapes import boxes_part
 from neurosym.geometry.staging import Staging, building
 
@@ -28,8 +29,7 @@ def laid_out(start: Sequence[str], plan: Sequence[str]) -> Staging:
     names = (*start, *plan)
     parts = []
     for slot, name in enumerate(names):
-        X = np.eye(4)
-        X[:3, 3] = PITCH * slot, 0.0, SIZE[2] / 2
-        parts.append(boxes_part(name, np.zeros((1, 3)), np.array(SIZE), X))
+        at = shifted((PITCH * slot, 0.0, SIZE[2] / 2))
+        parts.append(boxes_part(name, np.zeros((1, 3)), np.array(SIZE), at))
     staging = building(Assembly(tuple(parts), table=0.0), tuple(start), plan, dict.fromkeys(names, WOOD))
     return replace(staging, tops={name: tile_face(name[0]) for name in names})

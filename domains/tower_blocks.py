@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from neurosym.errors import AssemblyError, UnknownNameError
 from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.queries import AssemblyGeometry
+from neurosym.geometry.rigid_motions import shifted
 from neurosym.geometry.shapes import boxes_part
 
 Array = NDArray[np.float64]
@@ -160,9 +161,8 @@ class ReferenceTower:
             if name not in self.kinds:
                 raise UnknownNameError("block", name, self.names)
             size = self.kinds[name][1]
-            X = np.eye(4)
-            X[:3, 3] = x, y, top + size[2] / 2
-            parts.append(boxes_part(name, np.zeros((1, 3)), np.array(size), X))
+            at = shifted((x, y, top + size[2] / 2))
+            parts.append(boxes_part(name, np.zeros((1, 3)), np.array(size), at))
             top += size[2]
         return Assembly(tuple(parts), table=0.0)
 
@@ -175,8 +175,7 @@ class ReferenceTower:
 def _stack(sizes: tuple[tuple[float, float, float], ...], offsets: tuple[tuple[float, float], ...]) -> AssemblyGeometry:
     parts, top = [], 0.0
     for i, (size, (x, y)) in enumerate(zip(sizes, offsets), 1):
-        X = np.eye(4)
-        X[:3, 3] = x, y, top + size[2] / 2
-        parts.append(boxes_part(f"level {i}", np.zeros((1, 3)), np.array(size), X))
+        at = shifted((x, y, top + size[2] / 2))
+        parts.append(boxes_part(f"level {i}", np.zeros((1, 3)), np.array(size), at))
         top += size[2]
     return AssemblyGeometry(Assembly(tuple(parts), table=0.0))

@@ -24,7 +24,6 @@ from neurosym.geometry.rigid_motions import are_rigid
 from neurosym.geometry.shapes import Part
 from neurosym.geometry.tolerances import DEFAULT_TOLERANCES, Tolerances
 from neurosym.support.arrays import Array, Numbers
-from neurosym.support.progress import Progress, silent
 
 #: The height of a table that is not there: infinitely far down, where nothing touches it.
 NO_TABLE = float("-inf")
@@ -108,26 +107,9 @@ class Assembly:
         return made
 
     @classmethod
-    def load(
-        cls,
-        path: str | Path,
-        *,
-        units: str | None = None,
-        fixed: Iterable[str] = (),
-        tolerances: Tolerances | None = None,
-        friction: float | None = None,
-        up: str | None = None,
-        problem: int = 1,
-        solution: int = 1,
-        meshes: str = "visual",
-        joints: Mapping[str, float] | None = None,
-        progress: Progress = silent,
-    ) -> Assembly:
-        """An assembly from a folder of meshes or a file, looked over: see `neurosym.geometry.readers.loading.load`."""
-        loaded: Assembly = _reader("loading").load(
-            path, units=units, fixed=fixed, tolerances=tolerances, friction=friction, up=up, problem=problem,
-            solution=solution, meshes=meshes, joints=joints, progress=progress,
-        )  # fmt: skip
+    def load(cls, path: str | Path, **options: Any) -> Assembly:
+        """An assembly from a folder of meshes or a file, looked over; options as `readers.loading.load` has them."""
+        loaded: Assembly = _reader("loading").load(path, **options)
         return loaded
 
     def save(self, path: str | Path) -> None:

@@ -65,8 +65,7 @@ class Bodies:
     def vertices(self, body: int) -> Array:
         """float64 (k, 3): the vertices of a body, in the world."""
         X = self.X_WB[body]
-        vertices: Array = self[body].shape.vertices @ X[:3, :3].T + X[:3, 3]
-        return vertices
+        return np.asarray(self[body].shape.vertices @ X[:3, :3].T + X[:3, 3])
 
     def of(self, parts: int) -> list[int]:
         """Numbers of the bodies of the parts in a bitset."""

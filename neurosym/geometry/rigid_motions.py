@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -52,10 +53,16 @@ class Interpolation:
         return X
 
 
-def shifted(way: Array) -> Array:
+def shifted(way: Array | Sequence[float]) -> Array:
     """The translation by a vector (3,), as a motion (4, 4)."""
+    return posed(_UNTURNED, way)
+
+
+def posed(R: Array, at: Array | Sequence[float]) -> Array:
+    """The pose (4, 4) of a rotation (3, 3) and a place (3,)."""
     X = np.eye(4)
-    X[:3, 3] = way
+    X[:3, :3] = R
+    X[:3, 3] = at
     return X
 
 

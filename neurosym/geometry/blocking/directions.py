@@ -59,8 +59,7 @@ def directions_for(
     lengths = np.linalg.norm(vectors, axis=1)
     if not np.isfinite(lengths).all() or not lengths.all():
         raise InputError(f"Expected directions as non-zero vectors of shape (k, 3); got {vectors.tolist()}.")
-    unit: Array = vectors / lengths[:, None]
-    return unit
+    return np.asarray(vectors / lengths[:, None])
 
 
 _WORDS = '"axes", "contacts", a number, or axes such as "+z,-x"'

@@ -175,8 +175,7 @@ class Clearance:
 
     def _apart(self, i: Numbers, j: Numbers) -> Array:
         """From moving boxes' centres to others', where they are assembled, along the axes of the moving ones."""
-        found: Array = np.einsum("nd,ndi->ni", self._Y[j, :3, 3] - self._X[i, :3, 3], self._X[i, :3, :3])
-        return found
+        return np.asarray(np.einsum("nd,ndi->ni", self._Y[j, :3, 3] - self._X[i, :3, 3], self._X[i, :3, :3]))
 
     def _inner(self, X: Array) -> Array:
         """A motion of the world as one of the scaled world about its middle."""
@@ -192,8 +191,7 @@ class Clearance:
     def _travel(motion: Interpolation, corners: Array) -> Array:
         """How far (n,) any point of each body goes at most."""
         radii = np.linalg.norm(corners - motion.centre, axis=2).max(axis=1)
-        travelled: Array = np.linalg.norm(motion.way) + motion.angle * radii
-        return travelled
+        return np.asarray(np.linalg.norm(motion.way) + motion.angle * radii)
 
     def _object(self, body: Body, all_boxes: bool, pose: Array) -> object:
         shape = body.shape

@@ -38,8 +38,7 @@ class GridCells:
 
     def shift(self, steps: Numbers) -> Array:
         """The translation, float64 (3,) in the world, of so many steps along each of the grid's axes."""
-        moved: Array = self.frame @ (np.asarray(steps) * self.pitch)
-        return moved
+        return np.asarray(self.frame @ (np.asarray(steps) * self.pitch))
 
     def lowest(self, part: int) -> float:
         """Height (z, world) of the lowest point of a part."""

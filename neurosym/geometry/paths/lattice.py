@@ -19,7 +19,7 @@ import numpy as np
 
 from neurosym.geometry.paths.levels import commonest, levels_along
 from neurosym.geometry.paths.removal import Removal
-from neurosym.geometry.rigid_motions import Interpolation
+from neurosym.geometry.rigid_motions import Interpolation, posed
 from neurosym.support.arrays import Array
 
 #: Orientation (a number) and offset along the three axes.
@@ -157,15 +157,11 @@ class Lattice:
         x, y, z = self._frame[:, axis]
         cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
         R = np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * (cross @ cross)
-        turned: Array = _about(pose[:3, :3] @ pivot + pose[:3, 3], R) @ pose
-        return turned
+        return np.asarray(_about(pose[:3, :3] @ pivot + pose[:3, 3], R) @ pose)
 
     def _pose(self, node: Node) -> Array:
         R = self._rotations[node[0]]
-        X = np.eye(4)
-        X[:3, :3] = R
-        X[:3, 3] = self.removal.centre + self._frame @ node[1:] - R @ self.removal.centre
-        return X
+        return posed(R, self.removal.centre + self._frame @ node[1:] - R @ self.removal.centre)
 
     def _node(self, X: Array) -> Node:
         """The node of a pose that is turned by quarters."""
@@ -178,8 +174,7 @@ class Lattice:
         return self.removal.left(self._pose(node))
 
     def _in_world(self, local: Array) -> Array:
-        world: Array = self._frame @ local @ self._frame.T
-        return world
+        return np.asarray(self._frame @ local @ self._frame.T)
 
     def _middles(self) -> Array:
         """Points of the moving parts to turn about, float64 (n, 3), each once.
@@ -194,8 +189,7 @@ class Lattice:
         between = np.array(list(product(*((0.0, span) for span in spans)))) @ self._frame.T + self.removal.centre
         points = np.concatenate([self.removal.centre[None], bounds[largest].mean(axis=1), between])
         _, first = np.unique(np.round(points, self._digits), axis=0, return_index=True)
-        middles: Array = points[np.sort(first)]
-        return middles
+        return np.asarray(points[np.sort(first)])
 
     def _levels(self, orientation: int) -> list[list[float]]:
         """Offsets along the three axes, in order; 0 and one beyond each end are among them."""
@@ -220,10 +214,7 @@ def _quarter_turns() -> list[Array]:
 
 def _about(point: Array, R: Array) -> Array:
     """The rotation R (3, 3) about a point (3,), as a motion (4, 4)."""
-    X = np.eye(4)
-    X[:3, :3] = R
-    X[:3, 3] = point - R @ point
-    return X
+    return posed(R, point - R @ point)
 
 
 def _edge(a: Node, b: Node) -> tuple[Node, Node]:

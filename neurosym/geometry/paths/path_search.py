@@ -19,7 +19,7 @@ from neurosym.geometry.paths.lattice import Lattice
 from neurosym.geometry.paths.path_check import check_path
 from neurosym.geometry.paths.removal import OutOfBudget, Removal
 from neurosym.geometry.paths.trees import Growth, connected, grown_out
-from neurosym.geometry.rigid_motions import Interpolation, shifted
+from neurosym.geometry.rigid_motions import Interpolation, posed, shifted
 from neurosym.geometry.step_motion import Kind, StepMotion
 from neurosym.support.arrays import Array
 
@@ -167,9 +167,7 @@ def _tree(removal: Removal, turning: bool, growth: Growth) -> list[Array] | None
     high = (removal.other_points.max(axis=0) + reach - centre) / scale
 
     def pose(X: Array) -> Array:
-        posed = X.copy()
-        posed[:3, 3] = centre + scale * X[:3, 3] - X[:3, :3] @ centre
-        return posed
+        return posed(X[:3, :3], centre + scale * X[:3, 3] - X[:3, :3] @ centre)
 
     if turning:
         motions = grown_out(

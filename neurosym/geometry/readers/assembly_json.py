@@ -72,14 +72,7 @@ def _shape(shape: Shape) -> dict[str, Any]:
 
 
 def read_json(path: Path, read_mesh: Callable[[Path], RawMesh]) -> Contents:
-    """The assembly in a file.
-
-    Args:
-        read_mesh: reads a mesh that a part names by its path.
-
-    Raises:
-        AssemblyError: it is no such JSON; the message names the place.
-    """
+    """The assembly in a file; `read_mesh` reads a mesh that a part names by its path. Errors name the place."""
     try:
         text = gunzip(read_bytes(path, MAX_TEXT_BYTES), path).decode("utf-8")
         given = json.loads(text, object_pairs_hook=_each_once, parse_constant=_no_constant)

@@ -50,15 +50,7 @@ class _Shape:
 
 
 def read_xmpuzzle(path: Path, *, problem: int = 1, solution: int = 1) -> Contents:
-    """The pieces of one stored solution, cells of edge 1.
-
-    Args:
-        problem, solution: which, counted from 1.
-
-    Raises:
-        AssemblyError: it is no puzzle on the cubic grid, or its pieces overlap.
-        InputError: it has no such problem, or no such solution stored.
-    """
+    """The pieces, cells of edge 1, of a stored solution of a problem, counted from 1; `InputError` for none such."""
     data = gunzip(read_bytes(path, MAX_TEXT_BYTES), path)
     with reading("a BurrTools puzzle", path):
         root = fromstring(data, forbid_dtd=True)

@@ -14,11 +14,7 @@ MAX_COORDINATE = 1_000_000
 
 
 def parts_from_cells(cells: Mapping[str, Iterable[Sequence[int]]], size: float) -> tuple[Part, ...]:
-    """A part for each name, each of its cells a box of edge `size`; cell (x, y, z) spans size * (x .. x + 1).
-
-    Raises:
-        AssemblyError: what `Assembly.from_cells` says.
-    """
+    """See `Assembly.from_cells`."""
     if not np.isfinite(size) or size <= 0:
         raise AssemblyError(f"Expected a cell size above 0; got {size!r}.")
     if not isinstance(cells, Mapping):

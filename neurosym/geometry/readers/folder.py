@@ -29,12 +29,7 @@ PARTS, SUPPORTS = "parts", "supports.json"
 
 
 def read_mesh(path: Path) -> RawMesh:
-    """The mesh in a file, named after it.
-
-    Raises:
-        UnknownNameError: the file's ending is none of `MESHES`.
-        AssemblyError: the file cannot be read.
-    """
+    """The mesh in a file, named after it; `UnknownNameError` where its ending is none of `MESHES`."""
     ending = path.suffix.lower()
     if ending not in MESHES:
         raise UnknownNameError("mesh format", ending, MESHES)
@@ -43,25 +38,18 @@ def read_mesh(path: Path) -> RawMesh:
 
 
 def read_folder(folder: Path) -> Contents:
-    """The parts of a folder.
-
-    Raises:
-        AssemblyError: no meshes in it, one that cannot be read, a link that leads outside.
-    """
-    below = folder / PARTS
+    """The parts of a folder; `AssemblyError` for no meshes, one that cannot be read, a link that leads outside."""
     with reading("a folder of meshes", folder):
-        has_parts = below.is_dir()
-        if has_parts:
-            inside(folder, PARTS)
-        files = _mesh_files(below if has_parts else folder)
-        around = _mesh_files(folder) if has_parts else []
+        has_parts = (folder / PARTS).is_dir()
+        where = inside(folder, PARTS) and folder / PARTS if has_parts else folder
+        files = _mesh_files(where)
+        every = [*files, *(_mesh_files(folder) if has_parts else [])]
     if not files:
-        where = below if has_parts else folder
         raise AssemblyError(f"Expected meshes ({', '.join(MESHES)}) in {where}; got none. Put one file a part there.")
-    within_limits(folder, 0, parts=len(files) + len(around))
-    names, notes = distinct([f.stem for f in (*files, *around)])
+    within_limits(folder, 0, parts=len(every))
+    names, notes = distinct([file.stem for file in every])
     meshes: list[RawMesh] = []
-    for name, file in zip(names, (*files, *around)):
+    for name, file in zip(names, every):
         meshes.append(replace(read_mesh(inside(file.parent, file.name)), name=name))
         within_limits(folder, 0, sum(len(m.faces) for m in meshes))
     supports = folder if has_parts or folder.name != PARTS else folder.parent

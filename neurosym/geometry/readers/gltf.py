@@ -39,14 +39,7 @@ _UNDERSTOOD = (*_HARMLESS, "KHR_mesh_quantization", "EXT_mesh_gpu_instancing")
 
 
 def read_gltf(path: Path, *, up: str | None = None) -> Contents:
-    """The parts of a scene.
-
-    Args:
-        up: "y" or "z", what is up in the file; None: see above.
-
-    Raises:
-        AssemblyError: it is no glTF 2.0, is compressed (Draco, meshopt), refers to files elsewhere, or is too large.
-    """
+    """The parts of a scene. `up`: "y" or "z", what is up in the file; None: see above."""
     with limits.reading("glTF 2.0", path):
         scene = open_gltf(limits.read_bytes(path), path)
         up = up or ("z" if "trimesh" in str(scene.tree["asset"].get("generator", "")) else "y")

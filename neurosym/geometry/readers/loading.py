@@ -202,7 +202,7 @@ def _read(source: Path, options: Options) -> Contents:
 def _examined(
     given: Sequence[RawMesh | Part], progress: Callable[[int], None]
 ) -> tuple[tuple[Part, ...], list[Note], list[Note]]:
-    """Sound parts in order, what was found, and what is wrong with the others; `progress` is told how many are done."""
+    """Sound parts in order, what was seen, and what is wrong with the others; `progress` is told how many are done."""
     notes: list[Note] = []
     faults: list[Note] = []
     sound: list[RawMesh | Part] = []

@@ -50,7 +50,7 @@ def _one_body(vertices: Array, faces: Numbers) -> Body:
     X[:3, 3] = centre
     local = vertices - centre
     convex = are_convex(local, faces, 1e-9 * float(np.ptp(local)))
-    return Body((Convex if convex else Mesh)(local, faces), X)
+    return Body((Convex if convex else Mesh)(local, faces), shifted(centre))
 
 
 def _common_grid(meshes: Mapping[str, Triangles], tolerances: Tolerances) -> dict[str, tuple[Body, ...]]:
@@ -87,7 +87,7 @@ def _common_grid(meshes: Mapping[str, Triangles], tolerances: Tolerances) -> dic
         counts = own_cells.max(axis=0) + 1
         if many and len(own_cells) != counts.prod():
             continue
-        size = counts * pitch if many else np.full(3, pitch)
+        box = Box(counts * pitch if many else np.full(3, pitch))
         centres = [counts / 2] if many else own_cells + 0.5
         bodies = []
         for centre in centres:
@@ -107,8 +107,7 @@ def _mean_frame(frame: Array, meshes: list[Triangles]) -> Array:
     axis = np.abs(along).argmax(axis=1)
     columns = [(np.sign(along[axis == k, k])[:, None] * area[axis == k]).sum(axis=0) for k in range(3)]
     u, _, vt = np.linalg.svd(np.stack([c / np.linalg.norm(c) for c in columns], axis=1))
-    nearest: Array = u @ vt
-    return nearest
+    return np.asarray(u @ vt)
 
 
 def _orthogonal_frame(vertices: Array, faces: Numbers, tolerances: Tolerances) -> Array | None:

@@ -15,11 +15,7 @@ from neurosym.geometry.readers.solids import by_name
 
 
 def read_obj(path: Path, *, split: bool = False) -> Contents:
-    """One mesh; with `split`, one for each object (``o``) that has faces, or for each group (``g``) of a lone one.
-
-    Raises:
-        AssemblyError: a line that cannot be read, with its number.
-    """
+    """One mesh; with `split`, one for each object (``o``) that has faces, or for each group (``g``) of a lone one."""
     vertices: list[tuple[float, ...]] = []
     objects: list[tuple[str, dict[str, list[list[int]]]]] = [(path.stem, {})]
     group = ""

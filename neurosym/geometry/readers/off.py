@@ -16,11 +16,7 @@ _KINDS = {"OFF", "COFF", "NOFF", "STOFF", "CNOFF"}
 
 
 def read_off(path: Path) -> Contents:
-    """One mesh.
-
-    Raises:
-        AssemblyError: it is no OFF.
-    """
+    """One mesh."""
     with reading("OFF", path):
         text = read_bytes(path, MAX_TEXT_BYTES).decode("utf-8")
         lines = [words for line in text.splitlines() if (words := line.split("#", 1)[0].split())]

@@ -44,11 +44,7 @@ class _Element:
 
 
 def read_ply(path: Path) -> Contents:
-    """One mesh.
-
-    Raises:
-        AssemblyError: it is no PLY, is cut off, or has no polygons.
-    """
+    """One mesh."""
     data = read_bytes(path)
     with reading("PLY", path):
         head, body = _header(data, path)

@@ -18,7 +18,7 @@ from neurosym.support.progress import Progress, silent
 
 @dataclass(frozen=True, kw_only=True)
 class Reading:
-    """How an assembly is read, where its files leave it open; None: as `Assembly.load` does by itself.
+    """How an assembly is read, where its files leave it open; None: as `load` does by itself.
 
     Attributes:
         units: of the lengths.
@@ -39,30 +39,18 @@ class Reading:
     joint: Mapping[str, float] | None = None
 
     def load(self, path: str | Path, progress: Progress = silent) -> Assembly:
-        """The assembly at a path; raises what `Assembly.load` does."""
-        return Assembly.load(
-            path,
-            units=self.units,
-            up=self.up,
-            tolerances=None if self.touch is None else Tolerances(touch=self.touch),
-            friction=self.friction,
-            problem=1 if self.puzzle is None else self.puzzle,
-            solution=1 if self.solution is None else self.solution,
-            meshes=self.meshes or "visual",
-            joints=self.joint,
-            progress=progress,
-        )
+        """The assembly at a path; raises what `neurosym.geometry.readers.loading.load` does."""
+        asked = {"units": self.units, "up": self.up, "friction": self.friction, "joints": self.joint}
+        asked |= {"problem": self.puzzle, "solution": self.solution, "meshes": self.meshes}
+        asked |= {"tolerances": None if self.touch is None else Tolerances(touch=self.touch)}
+        return Assembly.load(path, progress=progress, **{k: v for k, v in asked.items() if v is not None})
 
     def as_json(self) -> dict[str, Any]:
         """What was asked for, and nothing else."""
         return {name: value for name, value in asdict(self).items() if value is not None}
 
     def refuse(self, because: str) -> None:
-        """Refuse what the command line was asked for where there are no files that it could be asked of.
-
-        Raises:
-            InputError: anything was; the message has its names, and `because`.
-        """
+        """Refuse (`InputError`) what the command line was asked for where there are no files to ask it of."""
         given = [f"--{name}" for name in self.as_json()]
         if given:
             raise InputError(f"Expected {', '.join(given)} with the files of an assembly; {because}.")

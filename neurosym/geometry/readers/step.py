@@ -63,12 +63,7 @@ Entities = dict[bytes, tuple[bytes, bytes]]
 
 
 def read_step(path: Path) -> Contents:
-    """The solids of a file, a part each, named after their products, in the file's unit.
-
-    Raises:
-        MissingDependencyError: cascadio is not installed.
-        AssemblyError: the file holds no solids, or reading it failed.
-    """
+    """A part each solid, named after products, in the file's unit; `MissingDependencyError` without cascadio."""
     if importlib.util.find_spec("cascadio") is None:
         raise MissingDependencyError(
             f"Expected cascadio, to read STEP ({path}); it is not installed. Run: pip install 'neurosym-assembly[cad]'."

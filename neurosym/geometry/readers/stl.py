@@ -19,11 +19,7 @@ _TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attrib
 
 
 def read_stl(path: Path) -> Contents:
-    """A mesh for each solid; normals and colours are passed over, for corners say which way a face looks.
-
-    Raises:
-        AssemblyError: neither its length nor its words are those of STL.
-    """
+    """A mesh for each solid; normals and colours are passed over, for corners say which way a face looks."""
     data = read_bytes(path)
     with reading("STL", path):
         binary = _binary(data)
@@ -64,8 +60,7 @@ def _text(data: bytes, path: Path) -> list[tuple[str, Array]]:
         at = [i for i, word in enumerate(lower) if word == "vertex"]
         facets, corners = lower.count("facet"), np.array([words[i + 1 : i + 4] for i in at])
         if len(at) != 3 * facets:
-            raise AssemblyError(
-                f"Expected three corners a facet in {path}; it has {facets} facets and {len(at)} corners."
-            )
+            what = f"{facets} facets and {len(at)} corners"
+            raise AssemblyError(f"Expected three corners a facet in {path}; it has {what}.")
         solids.append((start[1].strip(), corners.astype(np.float64).reshape(-1, 3, 3)))
     return [solid for solid in solids if len(solid[1])] or solids[:1]

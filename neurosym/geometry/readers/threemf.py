@@ -48,11 +48,7 @@ class _Model:
 
 
 def read_3mf(path: Path) -> Contents:
-    """The meshes that the build places, copies by component included.
-
-    Raises:
-        AssemblyError: it is no 3MF, or unpacks to too much.
-    """
+    """The meshes that the build places, copies by component included."""
     data = read_bytes(path)
     with reading("3MF", path), zipfile.ZipFile(io.BytesIO(data)) as archive:
         models: dict[str, _Model] = {}

@@ -260,8 +260,7 @@ class _Newton:
         matrix = bsr_array((data, self.indices, self.indptr), shape=(6 * self.m, 6 * self.m)).tocsc()
         options = {"SymmetricMode": True}
         factors = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
-        solution: Array = factors.solve(right)
-        return solution
+        return np.asarray(factors.solve(right))
 
 
 def _wrenches(axes: Array, arms: Array, sizes: Array) -> Array:
