@@ -77,9 +77,7 @@ class Assembly:
     ) -> Assembly:
         """Parts made of unit cells, each cell a box of edge `size`; cell (x, y, z) spans size * (x .. x + 1).
 
-        Raises:
-            AssemblyError: an empty part, a cell that comes twice or belongs to two parts, or that is no triple
-                of integers.
+        `AssemblyError` for an empty part, a cell that comes twice, is in two parts, or is no triple of integers.
         """
         return cls(_reader("cells").parts_from_cells(cells, size), table, friction, tolerances)
 

@@ -16,12 +16,11 @@ class Note:
     """One finding.
 
     Attributes:
-        part: name of the part; empty when it is about the file as a whole.
+        part: its name; empty when it is about the file as a whole.
         kind: one word: "open", "inverted", "winding", "self-intersecting", "degenerate", "nan", "empty", "flat",
             "far", "overlap", "floating", "name", "units", "axes", "t-junction", "skipped".
         measure: how much of it: edges, faces, a length, a volume; 0 where nothing is measured.
-        sentence: what was found, and what was done about it if anything was.
-        remedy: what to do about it; empty when nothing need be done.
+        sentence, remedy: what was seen, and done about it if anything was; what to do, if anything need be done.
         other: name of the second part, for findings about a pair.
     """
 

@@ -19,8 +19,7 @@ class Interpolation:
     Attributes:
         first, second: float64 (4, 4): rigid motions of the world, applied to the body where it is assembled.
         centre: float64 (3,): the point of the body, where it is assembled, that goes straight.
-        way: float64 (3,): how far the centre goes.
-        angle: how far the rotation turns, the shorter way (radians, 0 to pi).
+        way, angle: float64 (3,), how far the centre goes; how far the rotation turns, the shorter way (0 to pi).
     """
 
     def __init__(self, first: Array, second: Array, centre: Array) -> None:

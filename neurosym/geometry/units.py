@@ -15,11 +15,7 @@ _ALSO = {
 
 
 def unit(name: str) -> str:
-    """The short name of a unit, one of `METRES`, given by it or in words ("millimeter", "inches").
-
-    Raises:
-        UnknownNameError: none of them.
-    """
+    """The short name of a unit, one of `METRES`, given by it or in words ("inches"); `UnknownNameError` for none."""
     word = str(name).strip().lower()
     for form in (word, word.removesuffix("s"), "inch" if word == "inches" else "foot" if word == "feet" else word):
         known = _ALSO.get(form, form)

@@ -33,7 +33,6 @@ def directions_for(
     """Unit vectors, float64 (k, 3), in the order in which they are to be tried.
 
     Args:
-        assembly: whose axes and contacts are meant.
         spec: None or "axes" (`Assembly.axes`, the most upward first); "contacts" (`contact_directions`); a number k
             (that many, spread evenly over the sphere); "+z" or "-x"; several of these in one text, with commas
             between; or vectors of shape (k, 3) or (3,).

@@ -47,11 +47,7 @@ def assembly_graph(blocking: BlockingGraph, contacts: Iterable[Contact]) -> nx.M
 
 
 def write_graph(graph: nx.MultiDiGraph, path: Path) -> None:
-    """Write a graph, whole or not at all: GraphML, DOT or JSON (networkx's node-link form), by the file's ending.
-
-    Raises:
-        InputError: another ending.
-    """
+    """Write a graph, whole or not at all: GraphML, DOT or JSON (networkx's node-link form), by the file's ending."""
     write = FORMATS.get(path.suffix.lower())
     if write is None:
         raise InputError(f"Expected a file that ends in {', '.join(FORMATS)}; got {path}.")

@@ -98,11 +98,9 @@ class Clearance:
         return None
 
     def first_hit(self, motion: Interpolation, other: Interpolation | None = None) -> tuple[float, int, int] | None:
-        """Where on a motion two bodies first overlap by more than the tolerance: share of the way, and the two.
+        """Where two bodies first overlap by more than the tolerance: share of the way, and the two.
 
-        Args:
-            motion: of the moving bodies.
-            other: of the others; None: they rest.
+        The moving bodies go along `motion`, the others along `other`, or rest.
         """
         a = self._scaled(motion)
         b = None if other is None else self._scaled(other)

@@ -20,7 +20,6 @@ class GridCells:
     """Parts as sets of cells of one grid; masks of parts number their bits as the assembly does.
 
     Attributes:
-        names: the parts' names.
         cells: int64 (n_i, 3) for each part, each cell once.
         pitch: float64 (3,): a cell's edge lengths along the grid's axes; all equal for cubes.
         frame: float64 (3, 3): columns are the grid's axes, in the world; a rotation.

@@ -31,11 +31,7 @@ MAX_PIVOTS = 8
 
 
 class Lattice:
-    """The lattice of one removal.
-
-    Attributes:
-        complete: whether no way out on the lattice means that there is none by translations.
-    """
+    """The lattice of one removal. `complete`: no way out on it means that there is none by translations."""
 
     def __init__(self, removal: Removal, *, turns: bool = False) -> None:
         self.removal = removal
@@ -44,21 +40,18 @@ class Lattice:
         self._digits = int(np.ceil(2 - np.log10(removal.assembly.touch)))
         ground = removal.ground is None or bool(np.isclose(np.abs(self._frame[2]).max(), 1.0, atol=1e-9))
         self.complete = removal.aligned and ground and not turns
-        self._own = np.concatenate([removal.assembly.bodies.vertices(i) for i in removal.own_bodies]) - removal.centre
+        self._own = removal.assembly.bodies.points(removal.moving) - removal.centre
         self._rotations = [np.eye(3)]
         self._pivots = np.zeros((0, 3))
         if turns:
-            self._rotations += [r for r in map(self._in_world, _quarter_turns()) if not np.allclose(r, np.eye(3))]
+            turned = [self._frame @ local @ self._frame.T for local in _quarter_turns()]
+            self._rotations += [r for r in turned if not np.allclose(r, np.eye(3))]
             self._pivots = self._middles()
         self._offsets: dict[int, list[list[float]]] = {}
         self._known: dict[tuple[Node, Node], bool] = {}
 
     def search(self) -> list[Array] | None:
-        """Poses (4, 4) of a way out, where it bends only; None: there is none on the lattice.
-
-        Raises:
-            OutOfBudget: the removal's budget ended the search.
-        """
+        """Poses (4, 4) of a way out, where it bends only; None: there is none. `OutOfBudget` ends it before."""
         while True:
             way = self._shortest()
             if way is None:
@@ -83,7 +76,7 @@ class Lattice:
         corner = 1e-3 * self.removal.assembly.smallest_extent
         best = {start: 0.0}
         came: dict[Node, Node] = {}
-        queue: list[tuple[float, float, Node, int]] = [(self._left(start), 0.0, start, -1)]
+        queue: list[tuple[float, float, Node, int]] = [(self.removal.left(self._pose(start)), 0.0, start, -1)]
         done = set()
         while queue:
             _, cost, at, heading = heapq.heappop(queue)
@@ -91,7 +84,7 @@ class Lattice:
                 continue
             done.add(at)
             self.removal.spend()
-            if self._left(at) == 0.0:
+            if self.removal.left(self._pose(at)) == 0.0:
                 way = [at]
                 while way[-1] in came:
                     way.append(came[way[-1]])
@@ -101,7 +94,7 @@ class Lattice:
                 if following in done or reached >= best.get(following, np.inf) or not self._is_free(at, following):
                     continue
                 best[following], came[following] = reached, at
-                heapq.heappush(queue, (reached + self._left(following), reached, following, axis))
+                heapq.heappush(queue, (reached + self.removal.left(self._pose(following)), reached, following, axis))
         return None
 
     def _neighbours(self, at: Node) -> list[tuple[Node, float, int]]:
@@ -169,12 +162,6 @@ class Lattice:
         local = self._frame.T @ (X[:3, :3] @ self.removal.centre + X[:3, 3] - self.removal.centre)
         x, y, z = (round(float(v), self._digits) + 0.0 for v in local)
         return int(np.argmin(near)), x, y, z
-
-    def _left(self, node: Node) -> float:
-        return self.removal.left(self._pose(node))
-
-    def _in_world(self, local: Array) -> Array:
-        return np.asarray(self._frame @ local @ self._frame.T)
 
     def _middles(self) -> Array:
         """Points of the moving parts to turn about, float64 (n, 3), each once.

@@ -21,12 +21,9 @@ FILL = 24
 
 
 def levels_along(removal: Removal, direction: Array, rotation: Array, digits: int) -> list[float]:
-    """Offsets of the moving parts along a direction, in order; 0 and one beyond each end are among them.
+    """Offsets of the moving parts, turned by a rotation (3, 3), along one of the axes of the removal's frame, in order.
 
-    Args:
-        direction: float64 (3,): one of the axes of the removal's frame.
-        rotation: float64 (3, 3): how the moving parts are turned.
-        digits: to how many digits offsets are rounded.
+    0 and one beyond each end are among them; they are rounded to so many digits.
     """
     assembly = removal.assembly
     # Offsets are the centre's: turning back the direction is cheaper than turning the parts.

@@ -6,6 +6,7 @@ leaves here that `check_path` has not confirmed.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -42,14 +43,12 @@ SHORTCUTS = 60
 
 @dataclass(frozen=True)
 class Failure:
-    """No path was found.
+    """Why there is no path, in a sentence, after so many poses and ways were asked.
 
     Attributes:
-        reason: why, in a sentence.
         because: names of the parts that were in the way, the most frequent first.
         proved: whether no translations, however many and in whatever directions, take the parts out. Motions that turn
             are never ruled out.
-        checks: poses and ways asked.
     """
 
     reason: str
@@ -80,8 +79,8 @@ def extract(
         rng: for the searches with OMPL.
         ground: height (z, world) of a plane that nothing goes below; None: there is none.
         kinds: which searches to try, in this order: "lattice" and "translation" never turn the parts, "rigid" does.
-        max_checks: how many poses and ways each kind of search may ask.
-        seconds: a limit of time besides, for each kind; where it ends a search, another run may end elsewhere.
+        max_checks, seconds: how many poses and ways each kind of search may ask, and for how long; where time ends a
+            search, another run may end elsewhere.
 
     Raises:
         InputError: a kind that there is not, or parts that move without others that stay.
@@ -91,7 +90,7 @@ def extract(
             raise InputError(f"Expected kinds of search among {', '.join(KINDS)}; got {kind!r}.")
     if not moving or not among & ~moving:
         raise InputError("Expected parts that move and others that stay; one of the two is empty.")
-    met: dict[int, int] = {}
+    met: Counter[int] = Counter()
     proved, checks = False, 0
     reasons = []
     for kind in kinds:
@@ -121,11 +120,9 @@ def extract(
         elif kind != "lattice":
             reasons.append(f"no attempt of kind {kind!r} found a way out")
         checks += removal.checks
-        for part, count in removal.met.items():
-            met[part] = met.get(part, 0) + count
+        met += removal.met
     names = tuple(assembly.names[p] for p, _ in sorted(met.items(), key=lambda item: (-item[1], item[0])))
-    said = "; ".join(reasons)
-    return Failure(f"{', '.join(assembly.in_mask(moving))}: {said}.", names, proved, checks)
+    return Failure(f"{', '.join(assembly.in_mask(moving))}: {'; '.join(reasons)}.", names, proved, checks)
 
 
 def _turned(removal: Removal, max_checks: int) -> list[Array] | None:

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from neurosym.geometry.assembly import Assembly
+from neurosym.geometry.mesh.triangles import area_vectors
 from neurosym.geometry.paths.clearance import Clearance, Floor
 from neurosym.geometry.paths.path_check import apart
 from neurosym.geometry.rigid_motions import Interpolation, shifted
@@ -36,21 +37,14 @@ class Removal:
     """
 
     def __init__(
-        self,
-        assembly: Assembly,
-        moving: int,
-        others: int,
-        ground: float | None,
-        max_checks: int,
-        seconds: float | None,
+        self, assembly: Assembly, moving: int, others: int, ground: float | None, max_checks: int, seconds: float | None
     ) -> None:
         self.assembly, self.moving, self.others, self.ground = assembly, moving, others & ~moving, ground
         self.own_bodies, self.other_bodies = assembly.bodies.of(moving), assembly.bodies.of(self.others)
         self.clearance = Clearance(assembly, self.own_bodies, self.other_bodies)
         self.floor = None if ground is None else Floor(assembly, self.own_bodies, ground)
         self.centre = assembly.bodies.centre(moving)
-        self.own_points = _extreme(np.concatenate([assembly.bodies.vertices(i) for i in self.own_bodies]))
-        self.other_points = _extreme(np.concatenate([assembly.bodies.vertices(i) for i in self.other_bodies]))
+        self.own_points, self.other_points = (_extreme(assembly.bodies.points(m)) for m in (moving, self.others))
         self.frame, self.aligned = self._frame()
         self._axes = np.concatenate([np.eye(3), assembly.axes, self.frame.T])
         spans = self.other_points @ self._axes.T
@@ -62,11 +56,7 @@ class Removal:
         self.met: Counter[int] = Counter()
 
     def spend(self) -> None:
-        """Count one check.
-
-        Raises:
-            OutOfBudget: there are none left.
-        """
+        """Count one check; `OutOfBudget` where there are none left."""
         self.checks += 1
         if self.spent():
             raise OutOfBudget
@@ -91,10 +81,10 @@ class Removal:
         self.checks += 1
         if self.floor is not None and self.floor.first_hit(motion) is not None:
             return False
-        found = self.clearance.first_hit(motion)
-        if found is not None:
-            self.met[int(self.assembly.owners[found[2]])] += 1
-        return found is None
+        hit = self.clearance.first_hit(motion)
+        if hit is not None:
+            self.met[int(self.assembly.owners[hit[2]])] += 1
+        return hit is None
 
     def left(self, X: Array) -> float:
         """How far the parts at a pose still have to go, along one axis, to be out; 0 when they are (length)."""
@@ -137,14 +127,10 @@ class Removal:
                 return frame, False
             turns = np.abs(np.einsum("ji,njk->nik", frame, assembly.X_WB[every][:, :3, :3]))
             return frame, bool(np.abs(turns - np.round(turns)).max() <= assembly.tolerances.parallel)
-        area = []
-        for i in self.own_bodies:
-            t = assembly.bodies.vertices(i)[assembly.bodies[i].shape.faces]
-            area.append(np.cross(t[:, 1] - t[:, 0], t[:, 2] - t[:, 0]))
-        first = _main_direction(np.concatenate(area))
-        across = np.concatenate(area)
-        across = across - np.outer(across @ first, first)
-        second = _main_direction(across)
+        meshes = [assembly.bodies.vertices(i)[assembly.bodies[i].shape.faces] for i in self.own_bodies]
+        area = area_vectors(np.concatenate(meshes))
+        first = _main_direction(area)
+        second = _main_direction(area - np.outer(area @ first, first))
         return np.stack([first, second, np.cross(first, second)], axis=1), False
 
 

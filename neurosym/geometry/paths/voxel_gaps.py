@@ -25,7 +25,7 @@ State = tuple[int, ...]
 
 
 class Gaps:
-    """What is ahead of each part of a block, in any state.
+    """What is ahead of each part of a block, in any state; `InputError` for parts too far from one another.
 
     Args:
         masks: for each part, a bitset of the parts of the grid that move as one with it; the first holds the fixed ones
@@ -33,12 +33,6 @@ class Gaps:
         start: offset of each part of the grid in the state (0, ..., 0).
         ground: height (z, world) of a plane that no part but the first goes through; meeting it is meeting the first.
         one_by_one: whether pairs are looked at one by one, which is quicker where parts are few.
-
-    Attributes:
-        across: the longest side of the block's bounds, in cells.
-
-    Raises:
-        InputError: parts too far from one another.
     """
 
     def __init__(
@@ -46,7 +40,6 @@ class Gaps:
         cells: GridCells,
         masks: Sequence[int],
         start: Mapping[int, Offset],
-        *,
         ground: float | None,
         one_by_one: bool,
     ) -> None:
@@ -55,7 +48,7 @@ class Gaps:
             np.concatenate([cells.cells[p] + np.array(start[p], dtype=np.int64) for p in bits(mask)]) for mask in masks
         ]
         every = np.concatenate(self._bodies)
-        self.across = int(np.ptp(every, axis=0).max()) + 1
+        self.across = int(np.ptp(every, axis=0).max()) + 1  # the longest side of the block's bounds, in cells
         if self.across * 8 >= RADIX:
             raise InputError(f"Expected a block of fewer than {RADIX // 8} cells across; got {self.across}.")
         self._pairs = [(i, j) for i in range(self._count) for j in range(i + 1, self._count)]
@@ -74,30 +67,27 @@ class Gaps:
 
     def meetings(self, state: State) -> list[list[Meeting]]:
         """For each direction: (gap, i, j) wherever part i, going that way, meets part j."""
-        found: list[list[Meeting]] = [[], [], [], [], [], []]
-        for pair in self._pairs if self._one_by_one else self._facing(state):
-            i, j = pair
-            lines = self._lines.get(pair)
+        met: list[list[Meeting]] = [[], [], [], [], [], []]
+        for i, j in self._pairs if self._one_by_one else self._facing(state):
+            lines = self._lines.get((i, j))
             if lines is None:
-                lines = self._lines[pair] = _Lines(self._bodies[i], self._bodies[j])
+                lines = self._lines[i, j] = _Lines(self._bodies[i], self._bodies[j])
             for d, gap in lines.gaps(state[j] - state[i]):
-                found[d].append((gap, i, j))
-                found[d ^ 1].append((gap, j, i))
+                met[d].append((gap, i, j))
+                met[d ^ 1].append((gap, j, i))
         if self._clearance is not None:
             for d, rise in enumerate(self._rise):
                 if rise < -1e-9:
                     for i in range(1, self._count):
                         height = self._clearance[i] + float(self._cells.shift(np.array(decoded(state[i])))[2])
-                        found[d].append((int(height / -rise), i, 0))
-        return found
+                        met[d].append((int(height / -rise), i, 0))
+        return met
 
     def are_divided(self, state: State) -> bool:
         """Whether a layer of cells across one of the axes is empty between parts on both sides."""
-        offsets = [decoded(at) for at in state]
+        placed = list(zip(self._bounds, map(decoded, state)))
         for axis in range(3):
-            spans = sorted(
-                (int(b[0][axis]) + o[axis], int(b[1][axis]) + o[axis]) for b, o in zip(self._bounds, offsets)
-            )
+            spans = sorted((int(low[axis]) + o[axis], int(high[axis]) + o[axis]) for (low, high), o in placed)
             top = spans[0][1]
             for low, high in spans[1:]:
                 if low > top:

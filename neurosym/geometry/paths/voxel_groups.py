@@ -28,12 +28,8 @@ ENDLESS = 1 << 30
 def closures(ahead: Sequence[Meeting], count: int, steps: int, reference: int) -> Iterator[int]:
     """Of each part outside `reference`, the parts that go along when it goes `steps`, each group once.
 
-    Groups that drive the reference are left out.
-
-    Args:
-        ahead: what parts meet in the direction of the move.
-        count: how many parts there are.
-        reference: a bitset of parts that stay; may be empty.
+    Groups that drive the reference, a bitset of parts that stay, are left out. `ahead` is what each of the
+    `count` parts meets in the direction of the move.
     """
     along = [0] * count
     into = [0] * count
@@ -41,33 +37,32 @@ def closures(ahead: Sequence[Meeting], count: int, steps: int, reference: int) -
         if gap < steps:
             along[i] |= 1 << j
             into[j] |= 1 << i
-    held, new = reference, reference
-    while new:
-        before = 0
-        for i in bits(new):
-            before |= into[i]
-        new = before & ~held
-        held |= new
     seen = set()
-    for i in bits(((1 << count) - 1) & ~held):
-        group, new = 1 << i, along[i]
-        while new:
-            group |= new
-            after = 0
-            for j in bits(new):
-                after |= along[j]
-            new = after & ~group
+    for i in bits(((1 << count) - 1) & ~_closed(reference, into)):
+        group = _closed(1 << i, along)
         if group not in seen:
             seen.add(group)
             yield group
 
 
+def _closed(group: int, successors: Sequence[int]) -> int:
+    """A group with all that its members lead to."""
+    new = group
+    while new:
+        after = 0
+        for i in bits(new):
+            after |= successors[i]
+        new = after & ~group
+        group |= new
+    return group
+
+
 def unions(groups: Iterable[int]) -> list[int]:
     """All unions of one or more of these groups, in order of their numbers."""
-    found = {0}
+    every = {0}
     for group in groups:
-        found |= {group | known for known in found}
-    return sorted(found - {0})
+        every |= {group | known for known in every}
+    return sorted(every - {0})
 
 
 def undriving(ahead: Sequence[Meeting], count: int, reference: int) -> Iterator[int]:

@@ -54,8 +54,8 @@ def first_separation(
         accept: which groups are wanted; a group that leaves is the smallest that holds one of its parts. Other
             groups may make way, but stay by the block: states in which a plane with room about it divides the parts
             are left aside. That can be many states: give `max_states`.
-        max_states: how many states may be visited.
-        seconds: how long it may take; None: however long. Where this ends a search, another run may go farther.
+        max_states, seconds: how many states may be visited, and for how long; where time ends a search, another run
+            may go farther.
 
     Raises:
         InputError: fewer than two parts to tell apart, or parts too far from one another.
@@ -85,7 +85,7 @@ class _Search:
         self.all = (1 << self.count) - 1
         self.few = self.count <= FEW
         self.ground = ground if fixed else None
-        self.gaps = Gaps(cells, self.masks, self.start, ground=self.ground, one_by_one=self.few)
+        self.gaps = Gaps(cells, self.masks, self.start, self.ground, self.few)
 
     def run(self, max_states: int, seconds: float | None) -> Separation | Stuck:
         """Layer by layer, until a group can leave, all states were visited, or a limit ends it."""

@@ -20,13 +20,7 @@ Offset = tuple[int, int, int]
 
 @dataclass(frozen=True)
 class Move:
-    """A group of parts translated together.
-
-    Attributes:
-        group: a bitset of parts.
-        direction: one of `DIRECTIONS`, along the grid's axes.
-        steps: how many cells; None for without end.
-    """
+    """A group of parts, a bitset, moved along one of `DIRECTIONS` by so many cells, or without end (None)."""
 
     group: int
     direction: Offset
@@ -59,21 +53,18 @@ class Separation:
     @property
     def offsets(self) -> dict[int, Offset]:
         """Where each part of the block is when the last move begins."""
-        found = {part: np.array(offset) for part, offset in self.start.items()}
+        at = {part: np.array(offset) for part, offset in self.start.items()}
         for move in self.moves[:-1]:
             for part in bits(move.group):
-                found[part] = found[part] + np.array(move.direction) * (move.steps or 0)
-        return {part: (int(x), int(y), int(z)) for part, (x, y, z) in found.items()}
+                at[part] = at[part] + np.array(move.direction) * (move.steps or 0)
+        return {part: (int(x), int(y), int(z)) for part, (x, y, z) in at.items()}
 
 
 @dataclass(frozen=True)
 class Stuck:
-    """No separation was found.
+    """The parts of a block, a bitset, stay together, after so many states were visited.
 
-    Attributes:
-        proved: whether all states were visited: then no motion by translations separates anything.
-        explored: states that the search visited.
-        block: a bitset of the parts that stay together.
+    `proved`: all states were, so no motion by translations separates anything.
     """
 
     proved: bool

@@ -25,8 +25,7 @@ class RawMesh:
 
     Attributes:
         name: of the part, as the file has it; perhaps empty, perhaps not unique.
-        vertices: float64 (n, 3), in the part's frame, in the file's unit.
-        faces: int64 (m, 3), numbers of vertices.
+        vertices, faces: float64 (n, 3), in the part's frame and the file's unit; int64 (m, 3), numbers of vertices.
         rounding: of the coordinates, as a share of their size.
         X_WP: float64 (4, 4), the part's pose; None: the part's frame is the world.
         density: mass per unit of volume.
@@ -46,9 +45,7 @@ class Contents:
 
     Attributes:
         parts: meshes still to be looked at, and parts that are ready.
-        units: the unit that the format states, or None.
-        fixed: names of parts that never move.
-        table, friction, tolerances: as in `Assembly`; None where the file says nothing.
+        units, fixed, table, friction, tolerances: as in `Assembly`; None where the file says nothing.
         notes: what was odd but harmless.
         separate: whether solids of one mesh are parts of their own.
         hint: what to try where parts cannot be used; empty: what each fault says.

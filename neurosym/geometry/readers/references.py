@@ -20,13 +20,7 @@ from neurosym.support.progress import Progress, silent
 class Reading:
     """How an assembly is read, where its files leave it open; None: as `load` does by itself.
 
-    Attributes:
-        units: of the lengths.
-        up: "y" or "z", what is up in the files.
-        touch: share of the smallest extent up to which faces, near or overlapping, count as touching.
-        friction: Coulomb's coefficient.
-        puzzle, solution: which of a puzzle file's, counted from 1.
-        meshes, joint: which meshes of a robot's links, and values of its joints.
+    `touch` is `Tolerances.touch`; `puzzle` the number of a puzzle's problem; `joint` the values of a robot's joints.
     """
 
     units: str | None = None
@@ -69,8 +63,7 @@ def reference(path: Path, reading: Reading, assembly: Assembly) -> dict[str, Any
 def referenced(given: Any, beside: Path) -> Assembly:
     """The assembly that `reference` spoke of: at its path, or by its name beside the file that mentions it.
 
-    Raises:
-        InputError: it is in neither place, or it is another one now.
+    `InputError` where it is in neither place, or is another one now.
     """
     path = given.get("path") if isinstance(given, Mapping) else None
     if not isinstance(path, str):
