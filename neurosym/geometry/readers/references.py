@@ -34,7 +34,7 @@ class Reading:
 
     def load(self, path: str | Path, progress: Progress = silent) -> Assembly:
         """The assembly at a path; raises what `neurosym.geometry.readers.loading.load` does."""
-        asked = {"units": self.units, "up": self.up, "friction": self.friction, "joints": self.joint}
+        asked: dict[str, Any] = {"units": self.units, "up": self.up, "friction": self.friction, "joints": self.joint}
         asked |= {"problem": self.puzzle, "solution": self.solution, "meshes": self.meshes}
         asked |= {"tolerances": None if self.touch is None else Tolerances(touch=self.touch)}
         return Assembly.load(path, progress=progress, **{k: v for k, v in asked.items() if v is not None})
