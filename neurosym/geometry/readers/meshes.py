@@ -10,6 +10,7 @@ import numpy as np
 from neurosym.errors import AssemblyError
 from neurosym.geometry.mesh.topology import signed_volume
 from neurosym.geometry.mesh.triangles import are_convex, are_inside, area_vectors
+from neurosym.geometry.rigid_motions import posed, shifted
 from neurosym.geometry.shapes import Body, Box, Convex, Mesh, Part
 from neurosym.geometry.tolerances import Tolerances
 from neurosym.support.arrays import Array, Numbers, bounds
@@ -46,8 +47,6 @@ def parts_from_meshes(meshes: Mapping[str, Triangles], tolerances: Tolerances) -
 def _one_body(vertices: Array, faces: Numbers) -> Body:
     """A single body, its frame at the centre of its bounds, so that numbers stay small."""
     centre = np.mean(bounds(vertices), axis=0)
-    X = np.eye(4)
-    X[:3, 3] = centre
     local = vertices - centre
     convex = are_convex(local, faces, 1e-9 * float(np.ptp(local)))
     return Body((Convex if convex else Mesh)(local, faces), shifted(centre))
@@ -89,13 +88,7 @@ def _common_grid(meshes: Mapping[str, Triangles], tolerances: Tolerances) -> dic
             continue
         box = Box(counts * pitch if many else np.full(3, pitch))
         centres = [counts / 2] if many else own_cells + 0.5
-        bodies = []
-        for centre in centres:
-            X = np.eye(4)
-            X[:3, :3] = frame
-            X[:3, 3] = middle + frame @ (low + centre * pitch)
-            bodies.append(Body(Box(np.asarray(size, dtype=np.float64)), X))
-        boxes[name] = tuple(bodies)
+        boxes[name] = tuple(Body(box, posed(frame, middle + frame @ (low + centre * pitch))) for centre in centres)
     return boxes
 
 
