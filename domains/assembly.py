@@ -38,6 +38,7 @@ class Setting:
         groups: whether sub-assemblies may leave together.
         gravity: whether what stays must stand.
         held: how many parts may be held meanwhile.
+        pull: whether what stays must stand while the others are drawn out against friction, too.
     """
 
     directions: tuple[tuple[float, float, float], ...] | str = "axes"
@@ -45,6 +46,7 @@ class Setting:
     groups: bool = False
     gravity: bool = True
     held: int = 0
+    pull: bool = False
 
 
 class AssemblyFamily(ProblemFamily):
@@ -53,7 +55,7 @@ class AssemblyFamily(ProblemFamily):
     name = "assembly"
     reference = (
         "Wilson and Latombe, Geometric reasoning about mechanical assembly (Artificial Intelligence 71, 1994): "
-        "directional blocking; Livesley (1978): stability by limit analysis"
+        "directional blocking; Livesley (1978): stability by limit analysis; Kao et al. (2022): that forces must arise"
     )
     #: The symbols where no option says otherwise; those of groups are in `domains.assembly_groups`.
     domain = removal_domain(Setting())
@@ -67,6 +69,9 @@ class AssemblyFamily(ProblemFamily):
         groups: bool = False,
         gravity: bool = True,
         held: int = 0,
+        stability: str = "springs",
+        pull: bool = False,
+        tilt: float = 0.0,
         fixed: Iterable[str] = (),
         ground: float | bool | None = None,
         before: Iterable[tuple[str, str]] = (),
@@ -86,6 +91,11 @@ class AssemblyFamily(ProblemFamily):
             gravity: whether what stays must stand by itself, friction included.
             held: how many of the parts that stay may be held meanwhile; any, and others at each step. Without gravity
                 it does not matter.
+            stability: what standing means: "springs", as a simulation shows it; or "limit", that some forces balance
+                the parts, whether or not they would arise. A fall that only springs see promises planners nothing.
+            pull: whether what stays must also stand while a part is drawn out along its way, which drags what it
+                touches: by friction times the force that presses the two. With springs, under gravity.
+            tilt: degrees by which gravity may be tilted, in any of four directions, without anything falling.
             fixed: names of parts that stay and need no support, besides those that the assembly itself fixes.
             ground: height of a plane under the parts (z, world), which nothing goes through; True: under the lowest
                 point; False: none; None: under the lowest point (or where the assembly has its table) with gravity,
@@ -99,20 +109,24 @@ class AssemblyFamily(ProblemFamily):
             AssemblyError: parts that cannot be used, or that reach below the ground.
         """
         assembly, called = _assembly(given, units)
-        _check_options(paths, groups, gravity, held, ground)
+        _check_options(paths, groups, gravity, held, ground, pull)
+        if pull and not (gravity and stability == "springs"):
+            raise InputError('Expected pull=True under gravity with stability="springs", which alone knows what drags.')
         assembly = assembly.with_fixed(dict.fromkeys((*assembly.fixed, *as_names(fixed, "fixed"))))
         assembly = assembly.with_table(_table(assembly, gravity, ground))
         if len(assembly.fixed) == len(assembly):
             raise InputError(f"Expected a part that is not fixed, to take out; all {len(assembly)} are. Fix fewer.")
-        geometry = AssemblyGeometry(assembly)
+        geometry = AssemblyGeometry(assembly, rule=stability, tilt=tilt)
         vectors = geometry.directions(directions)
         hands = int(held) if gravity else 0
-        setting = Setting(tuple(map(tuple, vectors.tolist())), paths, bool(groups), bool(gravity), hands)
+        setting = Setting(tuple(map(tuple, vectors.tolist())), paths, bool(groups), bool(gravity), hands, bool(pull))
         details = {
             "directions": directions if isinstance(directions, str | int) else vectors.tolist(),
             "ground": assembly.ground if assembly.has_table else None,
             "fixed": list(assembly.fixed),
-            **{key: getattr(setting, key) for key in ("paths", "groups", "gravity", "held")},
+            "stability": stability,
+            "tilt": geometry.tilt,
+            **{key: getattr(setting, key) for key in ("paths", "groups", "gravity", "held", "pull")},
         }
         make = apart_in_groups if groups else apart_one_by_one
         return make(geometry, setting, before=before, name=name or called, family=self.name, details=details)
@@ -143,10 +157,12 @@ def _assembly(given: Assembly | str | Path | int, units: str | None) -> tuple[As
     raise InputError(f"Expected an Assembly, the path of one, or the number of a sample; got {given!r}.")
 
 
-def _check_options(paths: str, groups: bool, gravity: bool, held: int, ground: float | bool | None) -> None:
+def _check_options(
+    paths: str, groups: bool, gravity: bool, held: int, ground: float | bool | None, pull: bool
+) -> None:
     if paths not in PATHS:
         raise UnknownNameError("kind of paths", paths, PATHS)
-    for what, value in (("groups", groups), ("gravity", gravity)):
+    for what, value in (("groups", groups), ("gravity", gravity), ("pull", pull)):
         if not isinstance(value, bool | np.bool_):
             raise InputError(f"Expected {what} as True or False; got {value!r}.")
     if isinstance(held, bool) or not isinstance(held, int | np.integer) or held < 0:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from domains.assembly_paths import NoWay, check_motion, way_out
+from domains.assembly_pull import drawn_out
 from domains.assembly_why import explain_removal, refute_removal
 from neurosym.geometry.queries import AssemblyGeometry
 from neurosym.geometry.step_motion import StepMotion
@@ -28,7 +29,9 @@ _p = part("p")
 def removal_domain(setting: Setting) -> Domain:
     """The symbols of removals, one a part."""
     possible = [can_leave(setting)(_p)]
-    if setting.gravity:
+    if setting.pull:
+        possible = [stands_at_first(setting)(), drawn_out(setting, can_leave(setting), present)(_p)]
+    elif setting.gravity:
         possible += [stands_at_first(setting)(), predicates.stable_without(present, held=setting.held)(_p)]
     remove = Action("remove", _p, pre=[present(_p), ~fixed(_p), *possible], eff=[~present(_p)], label="{p}")
     return Domain("assembly", fluents=[present, fixed], actions=[remove])

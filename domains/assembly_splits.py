@@ -12,10 +12,11 @@ and its anchor on different sides, that part's closure says so.
 from __future__ import annotations
 
 import heapq
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from domains.assembly_paths import NoWay, check_motion, separation, way_out
+from domains.assembly_pull import checked_while_drawn, stands_while_drawn
 from neurosym.geometry.queries import AssemblyGeometry
 from neurosym.geometry.step_motion import StepMotion
 from neurosym.language.predicates import stands
@@ -70,11 +71,10 @@ class Splitter:
         refused: Verdict | None = None
         while queue:
             _, _, kind, half = heapq.heappop(queue)
-            standing = self._standing(block, half.leaving)
+            motion = StepMotion(self.assembly.in_mask(half.leaving), self.graph.vectors[half.direction])
+            standing = self._standing(block, motion)
             if standing.holds:
-                held = standing.motion.held if standing.motion else ()
-                names = self.assembly.in_mask(half.leaving)
-                return Verdict(True, motion=StepMotion(names, self.graph.vectors[half.direction], held=held))
+                return standing
             refused = refused or standing
             taken = half.leaving | self.assembly.mask(standing.because)
             grown = self.graph.carried(taken, half.direction, block.parts)
@@ -107,10 +107,13 @@ class Splitter:
         if block.stands and self.setting.gravity:
             if len(motion.held) > self.setting.held or self.assembly.mask(motion.held) & ~rest:
                 return Verdict(False, motion.held, f"{', '.join(motion.held)} cannot all be held.")
-            answer = self.geometry.stability.standing(rest, held=self.assembly.mask(motion.held))
+            held = self.assembly.mask(motion.held)
+            answer = self.geometry.stability.standing(rest, held=held)
             if not answer.stands:
                 falling = self.assembly.in_mask(answer.moving)
                 return Verdict(False, falling, f"Without {said}, {listed(falling)} would fall.")
+            if self.setting.pull:
+                return checked_while_drawn(self.geometry, block.parts, motion)
         return Verdict(True, motion=motion)
 
     # -- straight lines ---------------------------------------------------------------------------------------
@@ -131,11 +134,15 @@ class Splitter:
         side = half.leaving if half.leaving >> part & 1 else block.parts & ~half.leaving
         heapq.heappush(queue, (side.bit_count(), kind * len(self.graph.vectors) + half.direction, kind, half))
 
-    def _standing(self, block: Block, leaving: int) -> Verdict:
+    def _standing(self, block: Block, motion: StepMotion) -> Verdict:
+        """Whether the rest stands without what leaves by a motion, and if asked for while it does; with that motion."""
         if not (block.stands and self.setting.gravity):
-            return Verdict(True)
-        names = self.assembly.in_mask(leaving)
-        return stands(self.geometry, block.parts & ~leaving, names, held=self.setting.held)
+            return Verdict(True, motion=motion)
+        rest = block.parts & ~self.assembly.mask(motion.parts)
+        answer = stands(self.geometry, rest, motion.parts, held=self.setting.held)
+        if answer.holds and self.setting.pull:
+            return stands_while_drawn(self.geometry, block.parts, [motion], self.setting.held)
+        return replace(answer, motion=motion if answer.motion is None else motion.joined(answer.motion))
 
     def _interlocked(self, block: Block, part: int, anchor: int) -> Verdict:
         name, kept = self.assembly.names[part], self.assembly.in_mask(anchor)
@@ -171,7 +178,5 @@ class Splitter:
         if isinstance(out, NoWay):
             # The part may come off together with others, which this search does not try.
             return Verdict(False, out.because, out.reason, proved=False)
-        standing = self._standing(block, 1 << part)
-        if not standing.holds:
-            return Verdict(False, standing.because, standing.reason, proved=False)
-        return Verdict(True, motion=out if standing.motion is None else out.joined(standing.motion))
+        standing = self._standing(block, out)
+        return standing if standing.holds else Verdict(False, standing.because, standing.reason, proved=False)

@@ -6,12 +6,14 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from domains.assembly_paths import NoWay, way_out
+from domains.assembly_pull import drawn_part
 from neurosym.geometry.queries import AssemblyGeometry
 from neurosym.geometry.step_motion import StepMotion
 from neurosym.language.explanation import Blocked, Cycle, Fall, WhyNot, blockers_of, smallest_cycle
 from neurosym.language.predicates import losses
 from neurosym.language.search_problem import Rejection
 from neurosym.support.bitsets import bits
+from neurosym.support.words import LISTED
 
 if TYPE_CHECKING:
     from domains.assembly import Setting
@@ -52,6 +54,9 @@ def explain_removal(
     falls: list[Fall] = []
     waiting: list[tuple[str, str]] = []
     unproved: list[str] = []
+    whole = geometry.stability.standing_when_held(there, setting.held) if setting.gravity else None
+    if whole is not None and not whole.stands:
+        falls.append(fall(geometry, there, 0, whole.moving, setting.held))
     for part in bits(there & ~geometry.assembly.fixed_mask):
         name = geometry.names[part]
         if not graph.free_directions(part, there):
@@ -63,10 +68,15 @@ def explain_removal(
                 unproved += [] if way.proved else [name]
                 continue
         waiting += [(name, first) for first, then in before if then == name and first not in done]
-        if setting.gravity:
+        if whole is not None and whole.stands:
             answer = geometry.stability.standing_when_held(there & ~(1 << part), setting.held)
             if not answer.stands:
-                falls.append(fall(geometry, 1 << part, answer.moving, setting.held))
+                told = len(falls) < LISTED
+                falls.append(fall(geometry, there, 1 << part, answer.moving, setting.held, told=told))
+            elif setting.pull:
+                drawn = drawn_part(geometry, setting, there, part)
+                if not drawn.holds:
+                    falls.append(Fall((name,), drawn.because, (), setting.held, drawn="in any direction that is free"))
     kept = geometry.mask({b.part for b in blocked})
     return WhyNot(
         after=done,
@@ -79,10 +89,15 @@ def explain_removal(
     )
 
 
-def fall(geometry: AssemblyGeometry, leaving: int, moving: int, held: int) -> Fall:
-    """What falls (a bitset) when the parts in `leaving` go."""
-    lost = losses(geometry, moving, leaving)
-    return Fall(geometry.in_mask(leaving), geometry.in_mask(moving), lost, held)
+def fall(
+    geometry: AssemblyGeometry, there: int, leaving: int, moving: int, held: int, *, told: bool = True
+) -> Fall:
+    """What falls (`moving`, a bitset) of the parts in `there` when those in `leaving` go, and how if `told`."""
+    lost, movement = losses(geometry, moving, leaving), ""
+    if told and geometry.rule == "springs":
+        first = next(iter(geometry.springs.movements(there & ~leaving)), None)
+        movement = first.sentence(geometry.names) if first else ""
+    return Fall(geometry.in_mask(leaving), geometry.in_mask(moving), lost, held, movement)
 
 
 def explain_groups(
@@ -140,5 +155,6 @@ def _falls_of_groups(geometry: AssemblyGeometry, setting: Setting, block: Block,
         if leaving and leaving not in found:
             answer = geometry.stability.standing_when_held(block.parts & ~leaving, setting.held)
             if not answer.stands:
-                found[leaving] = fall(geometry, leaving, answer.moving, setting.held)
+                told = len(found) < LISTED
+                found[leaving] = fall(geometry, block.parts, leaving, answer.moving, setting.held, told=told)
     return list(found.values())

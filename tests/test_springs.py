@@ -21,6 +21,7 @@ from neurosym.geometry.stability.spring_loads import drag, margin, standing_whil
 from neurosym.geometry.stability.spring_stability import DOWN, SpringStability
 from neurosym.geometry.stability.spring_stability import spring_stability as with_contacts
 from neurosym.geometry.stability.springs import DEFAULT_NUMBERS
+from neurosym.geometry.tolerances import Tolerances
 from neurosym.simulation.world import stands as simulated
 
 
@@ -226,6 +227,10 @@ def test_what_falls_is_held():
 # -- play -------------------------------------------------------------------------------------------------------
 
 
+def touching_within(world: ns.Assembly, gap: float) -> ns.Assembly:
+    return replace(world, tolerances=Tolerances(touch=gap / world.smallest_extent))
+
+
 def test_what_drops_by_its_play_rests():
     gap = 0.05
     walls = {"left": box((-2, 0, 0), (-1, 1, 3)), "right": box((1 + gap, 0, 0), (2, 1, 3))}
@@ -235,7 +240,7 @@ def test_what_drops_by_its_play_rests():
             parts["floor"] = box((-1, 0, 0), (1, 1, 1))
         world = assembly(parts, tuple(walls) + (("floor",) if floor else ()))
         assert not stands(world)
-        assert stands(world, clearance=2 * gap) is rests
+        assert stands(touching_within(world, 2 * gap)) is rests
 
 
 def test_a_wedge_sinks_into_its_play():
@@ -247,8 +252,8 @@ def test_a_wedge_sinks_into_its_play():
         for friction in (0.0, 0.5):
             world = assembly(parts, ("left", "right"), friction)
             assert not stands(world)
-            assert stands(world, clearance=2 * gap)
-    assert not stands(plug(5, 0.5), clearance=0.1)
+            assert stands(touching_within(world, 2 * gap))
+    assert not stands(touching_within(plug(5, 0.5), 0.1))
 
 
 # -- evidence, margin, loads ------------------------------------------------------------------------------------
@@ -299,15 +304,15 @@ def test_margin_is_the_tilt_that_a_block_bears(friction, high, angle):
 def test_a_pull_drags_what_lies_on_the_part():
     cells = {"low": [(0, 0, 0), (1, 0, 0)], "top": [(0, 0, 1), (1, 0, 1)]}
     loose = spring_stability(ns.Assembly.from_cells(cells))
-    assert not standing_while_pulled(loose, 0b11, 0, np.array([1.0, 0, 0])).stands
-    assert standing_while_pulled(loose, 0b11, 1, np.array([1.0, 0, 0])).stands
-    loads = drag(loose, 0b11, 0, np.array([1.0, 0, 0]))
+    assert not standing_while_pulled(loose, 0b11, 0b01, np.array([1.0, 0, 0])).stands
+    assert standing_while_pulled(loose, 0b11, 0b10, np.array([1.0, 0, 0])).stands
+    loads = drag(loose, 0b11, 0b01, np.array([1.0, 0, 0]))
     np.testing.assert_allclose(loads[1][:3], [1.0, 0, 0], atol=1e-2)  # mu = 0.5 times a weight of 2
     stopped = ns.Assembly.from_cells({**cells, "stop": [(2, 0, 1), (2, 0, 0), (2, 1, 0), (2, 1, 1)]}).with_fixed(
         ["stop"]
     )
-    assert standing_while_pulled(spring_stability(stopped), 0b111, 0, np.array([0.0, -1, 0])).stands is False
-    assert standing_while_pulled(spring_stability(stopped), 0b111, 0, np.array([1.0, 0, 0])).stands
+    assert standing_while_pulled(spring_stability(stopped), 0b111, 0b001, np.array([0.0, -1, 0])).stands is False
+    assert standing_while_pulled(spring_stability(stopped), 0b111, 0b001, np.array([1.0, 0, 0])).stands
 
 
 def test_a_load_moves_a_block_beyond_its_friction():

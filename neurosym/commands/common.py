@@ -184,6 +184,16 @@ class RemovalOptions:
         bool | None, typer.Option("--gravity/--no-gravity", help="Whether what stays must stand by itself (default).")
     ] = None
     held: Annotated[int | None, typer.Option(metavar="K", help="Parts that may be held meanwhile; default 0.")] = None
+    stability: Annotated[
+        Literal["springs", "limit"] | None,
+        typer.Option(help="What standing means: parts on springs rest (default), or some forces balance them."),
+    ] = None
+    pull: Annotated[
+        bool | None, typer.Option("--pull", help="What stays must stand, too, while a part is drawn out by friction.")
+    ] = None
+    tilt: Annotated[
+        float | None, typer.Option(metavar="DEG", help="What stays must stand however tilted by so many degrees.")
+    ] = None
     fixed: Annotated[list[str] | None, typer.Option(metavar="NAME", help="A part that stays. May be repeated.")] = None
 
     def given(self) -> dict[str, Any]:

@@ -22,7 +22,13 @@ MOST_LINES = 40
 SECONDS, EXPANSIONS = 60.0, 1_000_000
 
 
-def inspect(path: AssemblyPath, files: FileOptions, removal: RemovalOptions, as_json: AsJson = False) -> None:
+def inspect(
+    path: AssemblyPath,
+    files: FileOptions,
+    removal: RemovalOptions,
+    margin: Annotated[bool, typer.Option("--margin", help="How far it may be tilted before it falls.")] = False,
+    as_json: AsJson = False,
+) -> None:
     """Say what an assembly is: parts, volumes, contacts, what is free, what is interlocked and why, if it stands.
 
     Free and interlocked are meant for straight lines. With --paths any, and parts that are all made of cells, the
@@ -31,7 +37,7 @@ def inspect(path: AssemblyPath, files: FileOptions, removal: RemovalOptions, as_
     from neurosym.planning.inspection import inspect_problem
 
     problem = problem_at(path, files, replace(removal, paths=None).given())
-    inspection = inspect_problem(problem)
+    inspection = inspect_problem(problem, margin=margin)
     level = _level(problem) if removal.paths == "any" else None
     if as_json:
         answer = {"path": str(path), "units": problem.world.units, **inspection.as_json()}
@@ -149,6 +155,10 @@ def _show(problem: Problem, inspection: Inspection) -> None:
         print(f"It stands{f' while {chr(44).join(inspection.held)} are held' if inspection.held else ''}.")
     else:
         print(f"It does not stand: {', '.join(inspection.falls)} would fall.")
+        _lines(list(inspection.movements), "parts move")
+        print(f"{'Some' if inspection.balanced else 'No'} forces would balance it (limit analysis).")
+    if inspection.margin is not None:
+        print(f"It bears a tilt of {inspection.margin:.1f} degrees.")
     if inspection.notes:
         print("Loading:")
         _lines(list(inspection.notes), "notes")

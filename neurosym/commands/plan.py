@@ -54,6 +54,13 @@ def plan(
     pictures: PictureStyle = "clean",
     expansions: Annotated[int | None, typer.Option(help="Budget: states expanded.")] = None,
     k: Annotated[int | None, typer.Option(metavar="K", help="The K best plans, the likeliest first.")] = None,
+    sturdy: Annotated[
+        bool,
+        typer.Option(
+            "--sturdy",
+            help="Of an assembly, the plan that bears the greatest tilt at every step. The budget is of each try.",
+        ),
+    ] = False,
     files: FileOptions,
     removal: RemovalOptions,
     out: Annotated[Path | None, typer.Option(metavar="FILE", help="Keep it all as JSON.")] = None,
@@ -67,6 +74,7 @@ def plan(
     from neurosym.geometry.readers.references import reference
     from neurosym.pipeline import plans, solve
     from neurosym.planning.budget import Budget
+    from neurosym.planning.sturdiness import SturdyPlan, sturdiest_plan
     from neurosym.registry import load_domain
 
     cells = search.own_cells()
@@ -83,8 +91,10 @@ def plan(
         source = {} if cells is None else {"cells": cells}
     else:
         assembly = load_assembly(path, files)
-        problem = made(family.problem, assembly, options=options | {"name": path.resolve().name}, whose=family.name)
+        named = options | {"name": path.resolve().name}
+        problem = made(family.problem, assembly, options=named, whose=family.name)
         source = {"assembly": reference(path, files.reading(), assembly)}
+        options = options | {"stability": problem.details["stability"]}
     prior = search.prior
     if prior is None:
         prior = NO_PRIOR if path is None else UNTRAINED
@@ -95,7 +105,17 @@ def plan(
         "budget": budget,
         "oracle": search.oracle,
     }
-    results = plans(problem, k=k, rng=np.random.default_rng(search.seed), **settings)
+    sturdiest: SturdyPlan | None = None
+    if sturdy:
+        if path is None or k is not None or removal.tilt is not None:
+            raise InputError("Expected --sturdy with the path of an assembly, and without --k and --tilt.")
+        sturdiest = sturdiest_plan(
+            lambda tilt: made(family.problem, assembly, options=named | {"tilt": tilt}, whose=family.name),
+            lambda tilted: solve(tilted, rng=np.random.default_rng(search.seed), **settings),
+        )
+        results, options = [sturdiest.result], options | {"tilt": sturdiest.bears}
+    else:
+        results = plans(problem, k=k, rng=np.random.default_rng(search.seed), **settings)
     if not results:
         # The k best of none: ask for one, to be told why there is none.
         results = [solve(problem, rng=np.random.default_rng(search.seed), **settings)]
@@ -106,6 +126,7 @@ def plan(
         "budget": budget.limits,
         "seed": search.seed,
         **result_part(results[0]),
+        **({"sturdy": sturdiest.as_json()} if sturdiest else {}),
     }
     if k is not None:
         answer["plans"] = [result_part(result) for result in results]
@@ -115,6 +136,8 @@ def plan(
         print_json(answer)
     else:
         _show(problem, results, answer)
+        if sturdiest:
+            print(sturdiest.sentence)
     raise typer.Exit(results[0].status.exit_code)
 
 

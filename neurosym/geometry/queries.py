@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypeVar, TypeVarTuple, cast
 
+from neurosym.errors import InputError, UnknownNameError
 from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.shapes import Part
 from neurosym.support.arrays import Array
@@ -22,7 +23,12 @@ if TYPE_CHECKING:
     from neurosym.geometry.contact.contacts import Contact
     from neurosym.geometry.contact.surfaces import BodySurfaces
     from neurosym.geometry.paths.grid import GridCells
+    from neurosym.geometry.stability.spring_stability import SpringStability
     from neurosym.geometry.stability.standing import Stability
+
+#: What standing means: "springs": parts on springs come to rest under gravity, as a simulation shows it; "limit": some
+#: forces balance (limit analysis), whether or not they would arise.
+STABILITY_RULES = ("springs", "limit")
 
 T = TypeVar("T")
 Ts = TypeVarTuple("Ts")
@@ -35,10 +41,22 @@ class AssemblyGeometry:
         assembly: the data.
         tabulate: whether answers are tabulated and kept. Otherwise whether a part is blocked, and whether a subset
             stands, is asked anew each time: for checks that share no table with what they check.
+        rule: what `stability` means by standing, one of `STABILITY_RULES`.
+        tilt: degrees, 0 to 90, by which gravity may be tilted in any of four directions; of springs.
+
+    Raises:
+        UnknownNameError: another rule.
+        InputError: another tilt, or one with another rule than springs.
     """
 
-    def __init__(self, assembly: Assembly, *, tabulate: bool = True) -> None:
-        self.assembly, self.tabulate = assembly, tabulate
+    def __init__(
+        self, assembly: Assembly, *, tabulate: bool = True, rule: str = "springs", tilt: float = 0.0
+    ) -> None:
+        if rule not in STABILITY_RULES:
+            raise UnknownNameError("rule of stability", rule, STABILITY_RULES)
+        if not isinstance(tilt, int | float) or not 0 <= tilt < 90 or (tilt and rule != "springs"):
+            raise InputError(f"Expected a tilt of 0 to 90 degrees, which springs can judge; got {tilt!r} by {rule}.")
+        self.assembly, self.tabulate, self.rule, self.tilt = assembly, tabulate, rule, float(tilt)
         self.names, self.index = assembly.names, assembly.index
         self._graphs: dict[Any, BlockingGraph] = {}
         self._answers: dict[tuple[Any, ...], Any] = {}
@@ -50,7 +68,7 @@ class AssemblyGeometry:
 
     def anew(self) -> AssemblyGeometry:
         """The same assembly with nothing known and nothing tabulated."""
-        return AssemblyGeometry(self.assembly, tabulate=False)
+        return AssemblyGeometry(self.assembly, tabulate=False, rule=self.rule, tilt=self.tilt)
 
     def __len__(self) -> int:
         return len(self.names)
@@ -129,12 +147,24 @@ class AssemblyGeometry:
 
     # -- stability --------------------------------------------------------------------------------------------
 
+    @property
+    def stability(self) -> Stability | SpringStability:
+        """Which subsets of the parts stand under gravity, by the rule of this object."""
+        return self.limit if self.rule == "limit" else self.springs
+
     @cached_property
-    def stability(self) -> Stability:
-        """Which subsets of the parts stand still under gravity."""
+    def limit(self) -> Stability:
+        """Which subsets some forces balance."""
         from neurosym.geometry.stability.standing import Stability
 
         return Stability(self.assembly, self.contacts, remember=self.tabulate)
+
+    @cached_property
+    def springs(self) -> SpringStability:
+        """Which subsets come to rest on springs, with what moves, forces at contacts, margins and drag."""
+        from neurosym.geometry.stability.spring_stability import spring_stability
+
+        return spring_stability(self.assembly, self.contacts, remember=self.tabulate, tilt=self.tilt)
 
     # -- paths, and whatever else -----------------------------------------------------------------------------
 
@@ -156,8 +186,8 @@ class AssemblyGeometry:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Copies sent to other processes leave the answers behind: FCL's objects cannot travel."""
-        return _made, (self.assembly, self.tabulate)
+        return _made, (self.assembly, self.tabulate, self.rule, self.tilt)
 
 
-def _made(assembly: Assembly, tabulate: bool) -> AssemblyGeometry:
-    return AssemblyGeometry(assembly, tabulate=tabulate)
+def _made(assembly: Assembly, tabulate: bool, rule: str, tilt: float) -> AssemblyGeometry:
+    return AssemblyGeometry(assembly, tabulate=tabulate, rule=rule, tilt=tilt)

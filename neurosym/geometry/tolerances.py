@@ -16,6 +16,8 @@ class Tolerances:
     Attributes:
         touch: two faces touch when their gap, or their overlap, is at most this share. Real CAD parts overlap a
             little where they mate: measured on timber joints, answers agree for every value from 1e-3 to 5e-2.
+        play: of faces that touch, those further apart than this share have play: under gravity the parts drop until
+            the gap has closed, and rest. Beyond the default of `touch` only what was asked for touches at such a gap.
         mate: parts that overlap at rest by at most this share are taken to touch, and are thought apart by as much
             before anything is asked of their motion; parts that touch, but with no two faces in one plane (round
             ones, cut into facets, or joints that follow chords), touch where their faces come this near. The
@@ -29,6 +31,7 @@ class Tolerances:
     """
 
     touch: float = 1e-3
+    play: float = 1e-3
     mate: float = 7.5e-2
     mate_angle: float = 0.1
     parallel: float = 1e-4

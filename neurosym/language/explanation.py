@@ -37,16 +37,20 @@ class Fall:
     """Parts that would fall if others left.
 
     Attributes:
-        without: names of the parts that would leave.
+        without: names of the parts that would leave; none, where these fall as it is.
         parts: names of those that would fall.
         lost: pairs (a, b): a falls, and touched b, which would leave.
         held: how many parts may be held, which does not help.
+        movement: a sentence on what moves first, and how; empty where that is not known.
+        drawn: along what they would leave, dragging the others along; empty where these fall without them.
     """
 
     without: tuple[str, ...]
     parts: tuple[str, ...]
     lost: tuple[tuple[str, str], ...]
     held: int = 0
+    movement: str = ""
+    drawn: str = ""
 
 
 @dataclass(frozen=True)
@@ -177,7 +181,12 @@ def _fall(fall: Fall) -> str:
     lost = [f"{a} loses {b}" for a, b in fall.lost]
     held = "" if not fall.held else f", whichever {'part' if fall.held == 1 else f'{fall.held} parts'} one holds"
     cause = f" ({'; '.join(lost[:LISTED])}{'; ...' if len(lost) > LISTED else ''})" if lost else ""
-    return f"Without {listed(fall.without)}, {listed(fall.parts)} would fall{held}{cause}."
+    moves = f" {fall.movement}" if fall.movement else ""
+    if not fall.without:
+        return f"It does not stand as it is: {listed(fall.parts)} would fall{held}.{moves}"
+    if fall.drawn:
+        return f"Drawn {fall.drawn}, {listed(fall.without)} would drag {listed(fall.parts)} along{held}.{moves}"
+    return f"Without {listed(fall.without)}, {listed(fall.parts)} would fall{held}{cause}.{moves}"
 
 
 def _first(sentences: list[str], what: str) -> list[str]:

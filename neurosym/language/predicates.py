@@ -165,7 +165,7 @@ def stands(
         return Verdict(True, (), f"The others stand without {said}.", motion=motion)
     verdict = _falls(world, answer.moving, leaving, held)
     # The motion stays possible while every part that moves in it is there, whatever else has left.
-    until = None if present is None else tuple(Atom(present, (n,)) for n in verdict.because)
+    until = None if present is None or not answer.promises else tuple(Atom(present, (n,)) for n in verdict.because)
     return replace(verdict, until=until)
 
 

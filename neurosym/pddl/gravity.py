@@ -112,16 +112,19 @@ def weighed(
     initial = world.mask(n for n in world.names if present(n) in init)
     removed = {name: world.index[s.without] for name, s in asked.items() if s}
     orders = [[removed[name] for name in order if name in removed] for order in refuted]
-    found = find_falls(world.stability, initial, moves, held=first.held, refuted=orders, seconds=seconds)
+    by_limit = world.rule == "limit"
+    limit = world.limit if by_limit else world.springs.limit
+    found = find_falls(limit, initial, moves, held=first.held, refuted=orders, seconds=seconds)
     removals = [(s.without, i) for i in instances if (s := asked[i.name])]
     kept = _avert(world.assembly, present, found.falls, removals)
     return Weighed(
         [i for i in instances if i.ways],
         _helpers(kept),
         kept,
-        found.complete,
+        found.complete and by_limit,
         f"Gravity: {len(found.falls)} falls, found among {found.sets:,} connected sets of parts, "
-        + ("which are all that removals can lead to." if found.complete else "more than there was time for."),
+        + ("which are all that removals can lead to" if found.complete else "more than there was time for")
+        + ("." if by_limit else ", as far as forces that balance (limit analysis) tell: springs may see more."),
     )
 
 

@@ -119,6 +119,8 @@ def problem_of(document: Mapping[str, Any], path: str | Path = "plan.json") -> P
     if not isinstance(domain, str) or not isinstance(options, dict):
         raise InputError(f'Expected "domain" (a name) and "options" in {path}; got {domain!r} and {options!r}.')
     family = load_domain(domain)
+    if document.get("assembly") is not None:
+        options = {"stability": "limit", **options}  # which 0.1 did not write, for it knew of no other
     try:
         if document.get("cells") is not None:
             made: Problem = family.problem_from_cells(document["cells"], **options)  # type: ignore[attr-defined]

@@ -51,7 +51,10 @@ class Inspection:
             for, not in groups either, whatever left before. Empty when all come apart.
         why: what interlocks them; None when nothing does.
         stands: whether the whole stands by itself, or with parts held; True without gravity.
+        balanced: whether some forces balance it, as it is or with parts held (limit analysis); True without gravity.
         falls: names of the parts that would fall.
+        movements: sentences on what moves and how, what falls most first; of springs only.
+        margin: the largest tilt of gravity (degrees) that it bears; None where it was not asked for.
         held: names of the parts to hold so that it stands.
         notes: what was found while loading, in sentences.
     """
@@ -63,7 +66,10 @@ class Inspection:
     interlocked: tuple[str, ...]
     why: WhyNot | None
     stands: bool
+    balanced: bool
     falls: tuple[str, ...]
+    movements: tuple[str, ...]
+    margin: float | None
     held: tuple[str, ...]
     notes: tuple[str, ...]
 
@@ -72,8 +78,11 @@ class Inspection:
         return {**asdict(self), "why": None if self.why is None else self.why.as_json()}
 
 
-def inspect_problem(problem: Problem) -> Inspection:
+def inspect_problem(problem: Problem, *, margin: bool = False) -> Inspection:
     """Look at the assembly of a problem of the domain "assembly", with straight lines for ways out.
+
+    Args:
+        margin: whether to ask how much the standing whole may be tilted.
 
     Raises:
         InputError: a problem of another kind.
@@ -89,8 +98,12 @@ def inspect_problem(problem: Problem) -> Inspection:
         if (directions := graph.free_directions(i, everything))
     }
     why = problem.semantics.refute(problem)
-    standing = world.stability.standing_when_held(everything, problem.details["held"])
-    stands = standing.stands or not problem.details["gravity"]
+    held, gravity = problem.details["held"], problem.details["gravity"]
+    standing = world.stability.standing_when_held(everything, held)
+    stands = standing.stands or not gravity
+    # Springs that stand are forces that balance.
+    balanced = stands or world.springs.limit.standing_when_held(everything, held).stands
+    moves = world.springs.movements(everything) if not stands and world.rule == "springs" else ()
     return Inspection(
         parts=_parts(world),
         contacts=_contacts(world),
@@ -99,10 +112,19 @@ def inspect_problem(problem: Problem) -> Inspection:
         interlocked=() if why is None else tuple(n for n in why.left if n not in world.assembly.fixed),
         why=why,
         stands=stands,
+        balanced=balanced,
+        movements=tuple(m.sentence(world.names) for m in moves),
+        margin=_margin(world, everything, standing.held) if margin and gravity else None,
         falls=() if stands else world.in_mask(standing.moving),
         held=world.in_mask(standing.held) if stands else (),
         notes=tuple(map(str, world.assembly.notes)),
     )
+
+
+def _margin(world: AssemblyGeometry, subset: int, held: int) -> float:
+    from neurosym.geometry.stability.spring_loads import margin
+
+    return margin(world.springs, subset, held)
 
 
 def _parts(world: AssemblyGeometry) -> tuple[PartFacts, ...]:

@@ -114,6 +114,8 @@ def _contents(given: Any, read_mesh: Callable[[str], RawMesh], path: Path) -> Co
 def _tolerances(given: Any) -> Tolerances:
     known = vars(DEFAULT_TOLERANCES)
     values = _mapping("tolerances", given, set(known))
+    if "play" not in values and "touch" in values:  # written by 0.1, which knew of no play
+        values = {**values, "play": values["touch"]}
     return Tolerances(**{k: _number(f"tolerances.{k}", v, low=0.0) for k, v in {**known, **values}.items()})
 
 

@@ -49,7 +49,8 @@ def mating_tolerances(
     pairs = "one pair of parts" if len(slight) == 1 else f"{len(slight)} pairs of parts"
     sentence = f"Mating faces of {pairs} overlap, by up to {depth:.4g} between {a!r} and {b!r}; "
     sentence += f"overlaps up to {touch * smallest:.4g} ({touch:.2g} of the smallest extent) are taken for touch."
-    return replace(tolerances, touch=touch), [Note(a, "mating", depth, sentence, other=b)], faults
+    # Meshes so inexact are no closer to the parts than that: gaps of this size are no play.
+    return replace(tolerances, touch=touch, play=touch), [Note(a, "mating", depth, sentence, other=b)], faults
 
 
 def _too_deep(bodies: Bodies, i: int, j: int, depth: float, limit: float) -> Note:

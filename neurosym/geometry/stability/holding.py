@@ -23,6 +23,11 @@ class Standing:
     moving: int = 0
     held: int = 0
 
+    @property
+    def promises(self) -> bool:
+        """Whether any smaller subset falls while all of `moving` are there, none of them held."""
+        return not self.stands
+
 
 def parts_to_hold(standing: Callable[[int], Standing], hands: int, most: int) -> tuple[int | None, list[int]]:
     """What to hold, `most` parts at the most, so that a subset stands.

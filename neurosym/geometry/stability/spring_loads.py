@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from neurosym.geometry.stability.spring_stability import SpringStability
+from neurosym.geometry.stability.spring_stability import SpringStability, tilted
 from neurosym.geometry.stability.spring_verdicts import SpringStanding, moving_parts
 from neurosym.support.arrays import Array
 
-#: The horizontal directions in which gravity is tilted, and halvings of the angle from 90 degrees: to 0.2 degrees.
-_TILTS = np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -1.0, 0.0]])
+#: Halvings of the angle from 90 degrees: to 0.2 degrees.
 _HALVINGS = 9
 
 
@@ -18,29 +17,34 @@ def margin(stability: SpringStability, subset: int, held: int = 0) -> float:
     if not stability.standing(subset, held).stands:
         return 0.0
     least = 90.0
-    for direction in _TILTS:
+    for direction in range(4):
         low, high = 0.0, least  # what is borne beyond the least so far is of no interest
         for _ in range(_HALVINGS):
-            tilt = np.radians((low + high) / 2)
-            gravity = np.cos(tilt) * stability.gravity + np.sin(tilt) * direction
+            gravity = tilted(stability.gravity, (low + high) / 2)[direction]
             stands = stability.settled(subset, held, gravity=gravity).stands
             low, high = ((low + high) / 2, high) if stands else (low, (low + high) / 2)
         least = (low + high) / 2
     return least
 
 
-def drag(stability: SpringStability, subset: int, part: int, direction: Array, held: int = 0) -> dict[int, Array]:
-    """The force and torque, float64 (6,), on each part that one touches as it is drawn along a direction (3,).
+def drag(
+    stability: SpringStability, subset: int, leaving: int, direction: Array, held: int = 0
+) -> dict[int, Array]:
+    """The force and torque, float64 (6,), on each part that others touch as they are drawn along a direction (3,).
 
     It is mu times the force that presses the two, along the motion.
+
+    Args:
+        leaving: bitset of the parts that are drawn; all of them are in `subset`.
     """
     springs, settled = stability.springs, stability.settled(subset, held)
     way = np.asarray(direction, dtype=np.float64) / np.linalg.norm(direction)
     loads: dict[int, Array] = {}
     for k, corner in enumerate(settled.corners):
-        pair = int(springs.a[corner]), int(springs.b[corner])
-        other = pair[0] if pair[1] == part else pair[1]
-        if part not in pair or other < 0 or settled.forces[k, 0] <= 0:
+        a, b = int(springs.a[corner]), int(springs.b[corner])
+        drawn = [part >= 0 and bool(leaving >> part & 1) for part in (a, b)]
+        other = b if drawn[0] else a
+        if drawn[0] == drawn[1] or other < 0 or settled.forces[k, 0] <= 0:
             continue
         along = way - (way @ springs.axes[corner, 0]) * springs.axes[corner, 0]
         size = float(np.linalg.norm(along))
@@ -52,13 +56,16 @@ def drag(stability: SpringStability, subset: int, part: int, direction: Array, h
 
 
 def standing_while_pulled(
-    stability: SpringStability, subset: int, part: int, direction: Array, held: int = 0
+    stability: SpringStability, subset: int, leaving: int, direction: Array, held: int = 0
 ) -> SpringStanding:
-    """Whether a subset stands as one of its parts begins to be drawn along a direction (3,).
+    """Whether a subset stands as some of its parts begin to be drawn along a direction (3,).
 
-    What touches the part is dragged along. The part itself goes where it is drawn: it still carries what lies on it,
-    but holds nothing by friction.
+    What touches those parts is dragged along. They themselves go where they are drawn: they still carry what lies on
+    them, but hold nothing by friction. Only what hangs together with them is looked at.
     """
-    loads = drag(stability, subset, part, direction, held)
-    settled = stability.settled(subset, held | 1 << part, loads=loads, slippery=1 << part)
+    movable = subset & ~held & ~stability.fixed
+    near = sum(group for group in stability.groups(movable) if group & leaving)
+    around = stability.next_to(near) & subset & ~movable
+    loads = drag(stability, near | around, leaving, direction, around)
+    settled = stability.settled(near | around, around | leaving, loads=loads, slippery=leaving)
     return SpringStanding(settled.stands, 0 if settled.stands else moving_parts(settled), held)

@@ -9,8 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from neurosym.geometry.assembly import Assembly
-from neurosym.geometry.contact.contacts import Contact, find_contacts
-from neurosym.geometry.contact.surfaces import BodySurfaces
+from neurosym.geometry.contact.contacts import Contact
 from neurosym.geometry.stability.contact_springs import contact_springs
 from neurosym.geometry.stability.holding import parts_to_hold
 from neurosym.geometry.stability.load_paths import LEVEL, LoadPaths
@@ -31,6 +30,13 @@ from neurosym.support.bitsets import bits
 
 #: Gravity.
 DOWN = np.array([0.0, 0.0, -1.0])
+
+
+def tilted(gravity: Array, degrees: float) -> Array:
+    """float64 (4, 3): gravity tilted by so many degrees in each of four horizontal directions."""
+    angle = np.radians(degrees)
+    sideways = np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -1.0, 0.0]])
+    return np.asarray(np.cos(angle) * gravity + np.sin(angle) * sideways)
 
 
 class SpringStability:
@@ -54,6 +60,7 @@ class SpringStability:
         fixed: bitset of the parts that never move.
         gaps: float64 (len(patches),): how far apart the faces of each patch are (length): play, that closes first.
         gravity: float64 (3,), unit; or zeros, where there is none.
+        tilt: degrees by which gravity may be tilted in four horizontal directions: what stands must stand so, too.
         remember: whether answers are kept.
 
     Attributes:
@@ -75,17 +82,21 @@ class SpringStability:
         fixed: int = 0,
         gaps: Array | None = None,
         gravity: Array = DOWN,
+        tilt: float = 0.0,
         numbers: SpringNumbers = DEFAULT_NUMBERS,
         remember: bool = True,
     ) -> None:
         self.masses, self.fixed, self.gravity, self.remember = masses, fixed, gravity, remember
+        self._tilts = tilted(gravity, tilt) if tilt else np.zeros((0, 3))
         self.touching, self.supports, self.on_table = neighbours(patches, len(centres))
         self._make_limit = limit
         self._make_springs = functools.partial(
             contact_springs, patches, masses, centres, friction=friction, gaps=gaps, numbers=numbers
         )
-        # Neither proof knows of play, nor of a tilted world.
-        straight = bool(np.array_equal(gravity, DOWN)) and (gaps is None or not gaps.any())
+        # Limit analysis knows of no tilted world; play it takes for contact, which speaks for standing.
+        self._upright = bool(np.array_equal(gravity, DOWN))
+        # Loads that go straight down prove nothing where parts drop by different play, and so may tilt.
+        straight = self._upright and (gaps is None or not gaps.any())
         self._paths = LoadPaths(patches, centres) if straight else None
         self.asked = dict.fromkeys(("load paths", "single parts", "pushes", "springs"), 0)
         self._groups: dict[tuple[int, int], SpringStanding] = {}
@@ -104,11 +115,11 @@ class SpringStability:
         """Whether the parts in a bitset stand while those in `held` and the fixed parts cannot move."""
         held &= subset
         movable = subset & ~held & ~self.fixed
-        if self._paths is not None and self._paths.carry(subset, movable):
+        if self._paths is not None and not len(self._tilts) and self._paths.carry(subset, movable):
             self.asked["load paths"] += 1
             return SpringStanding(True, 0, held)
         for group in self.groups(movable):
-            answer = self._group(group, self._touching(group) & subset & ~movable)
+            answer = self._group(group, self.next_to(group) & subset & ~movable)
             if not answer.stands:
                 return replace(answer, held=held)
         return SpringStanding(True, 0, held)
@@ -144,7 +155,7 @@ class SpringStability:
         while movable:
             group = fresh = movable & -movable
             while fresh:
-                fresh = self._touching(fresh) & movable & ~group
+                fresh = self.next_to(fresh) & movable & ~group
                 group |= fresh
             found.append(group)
             movable &= ~group
@@ -154,14 +165,17 @@ class SpringStability:
 
     def movements(self, subset: int, held: int = 0) -> tuple[Movement, ...]:
         """How parts of a subset begin to fall, the one that falls most first; none if it stands."""
-        settled = self.settled(subset, held)
-        if settled.stands:
-            return ()
-        found = []
-        for movement in movements(self.springs, settled):
-            below, beside = self.supports[movement.part], self.touching[movement.part]
-            found.append(replace(movement, lost=below & ~subset or beside & ~subset))
-        return tuple(found)
+        movable = subset & ~held & ~self.fixed
+        for group in self.groups(movable):
+            around = self.next_to(group) & subset & ~movable
+            settled = None if self._group(group, around).stands else self.settled(group | around, around)
+            if settled is None or settled.stands:
+                continue
+            return tuple(
+                replace(m, lost=self.supports[m.part] & ~subset or self.touching[m.part] & ~subset)
+                for m in movements(self.springs, settled)
+            )
+        return ()
 
     def forces(self, subset: int, held: int = 0) -> ContactForces:
         """The forces at contacts in which a subset comes to rest."""
@@ -202,27 +216,32 @@ class SpringStability:
         answer = self._groups.get((group, around))
         if answer is None:
             answer = self._judge(group, around)
+            for gravity in self._tilts if answer.stands else ():
+                settled = self.settled(group | around, around, gravity=gravity)
+                if not settled.stands:
+                    answer = SpringStanding(False, moving_parts(settled))
+                    break
             if self.remember:
                 self._groups[group, around] = answer
         return answer
 
     def _judge(self, group: int, around: int) -> SpringStanding:
         there = group | around
-        if self._paths is not None:
+        if self._upright:
             falls = self._single_fall(group, there)
             if falls:
                 self.asked["single parts"] += 1
                 return SpringStanding(False, falls, balanced=False)
-            if self._pushes_balance(group, there):
-                self.asked["pushes"] += 1
-                return SpringStanding(True)
+        if self._paths is not None and self._pushes_balance(group, there):
+            self.asked["pushes"] += 1
+            return SpringStanding(True)
         self.asked["springs"] += 1
         settled = self.settled(there, around)
         if settled.stands:
             return SpringStanding(True)
         moving = moving_parts(settled)
-        if self._paths is not None:
-            near = self._touching(moving) & there & ~moving
+        if self._upright:
+            near = self.next_to(moving) & there & ~moving
             by_limit = self.limit.standing(moving | near, near)
             if not by_limit.stands:
                 return SpringStanding(False, by_limit.moving, balanced=False)
@@ -254,7 +273,8 @@ class SpringStability:
                     return 1 << part
         return 0
 
-    def _touching(self, parts: int) -> int:
+    def next_to(self, parts: int) -> int:
+        """Bitset of the parts that touch some of those in a bitset."""
         return functools.reduce(int.__or__, (self.touching[p] for p in bits(parts)), 0)
 
     def _mask(self, parts: int) -> Truths:
@@ -268,27 +288,21 @@ def spring_stability(
     assembly: Assembly,
     contacts: tuple[Contact, ...],
     *,
-    clearance: float = 0.0,
     gravity: Array = DOWN,
+    tilt: float = 0.0,
     numbers: SpringNumbers = DEFAULT_NUMBERS,
     remember: bool = True,
 ) -> SpringStability:
     """The stability of an assembly with these contacts, by springs.
 
-    Args:
-        clearance: faces that are so far apart (length) at the most touch once the gap has closed. Beyond the touching
-            tolerance, within which faces touch as they are, parts have play: what drops by it and then rests, stands.
+    Faces that touch, but are further apart than `Tolerances.play`, close that gap first: what drops by its play and
+    then rests, stands.
     """
     # No patch is shrunk: limit analysis is to refute only what no forces can hold.
     exact = replace(assembly, tolerances=replace(assembly.tolerances, patch_shrink=0.0))
-    near, gaps = exact, None
-    if clearance > assembly.touch:
-        wide = replace(assembly.tolerances, touch=clearance / assembly.smallest_extent)
-        near = replace(assembly, tolerances=wide)
-        patches = merged_patches(near, find_contacts(near, BodySurfaces(near.bodies)))
-        gaps = np.array([p.gap if p.gap > assembly.touch else 0.0 for p in patches])
-    else:
-        patches = merged_patches(exact, contacts)
+    patches = merged_patches(exact, contacts)
+    gaps = np.array([p.gap for p in patches])
+    gaps[gaps <= assembly.tolerances.play * assembly.smallest_extent] = 0.0
     mass, centres = masses(assembly)
     return SpringStability(
         patches,
@@ -299,6 +313,7 @@ def spring_stability(
         fixed=assembly.fixed_mask,
         gaps=gaps,
         gravity=gravity,
+        tilt=tilt,
         numbers=numbers,
         remember=remember,
     )

@@ -61,7 +61,6 @@ class SpringStanding(Standing):
 
     @property
     def promises(self) -> bool:
-        """Whether any smaller subset falls while all of `moving` are there, none of them held."""
         return not self.stands and not self.balanced
 
 
