@@ -24,7 +24,8 @@ from assembly_scaling import pyramid, wall
 
 import neurosym as ns
 from neurosym.geometry.queries import AssemblyGeometry
-from neurosym.geometry.stability.spring_stability import SpringStability, spring_stability
+from neurosym.geometry.stability.of_assembly import spring_stability
+from neurosym.geometry.stability.spring_stability import SpringStability
 from neurosym.simulation.world import stands
 from neurosym.support.bitsets import bits
 

@@ -148,7 +148,7 @@ class GroupSemantics(Semantics):
         if not self.setting.gravity:
             return Verdict(True)
         answer = world.stability.standing_when_held((1 << len(world)) - 1, self.setting.held)
-        falling = world.in_mask(answer.moving)
+        falling = world.in_mask(answer.falling)
         said = f"The assembly does not stand as it is: {listed(falling)} would fall."
         return Verdict(answer.stands, () if answer.stands else falling, "" if answer.stands else said)
 

@@ -80,7 +80,7 @@ def stands_while_drawn(world: AssemblyGeometry, there: int, motions: Sequence[St
 def checked_while_drawn(world: AssemblyGeometry, there: int, motion: StepMotion) -> Verdict:
     """The same of one motion, with what it says is held."""
     answer = _ask(world, there, motion, world.mask(motion.held))
-    return Verdict(True, motion=motion) if answer.stands else _refused(world, [motion], answer.moving, 0)
+    return Verdict(True, motion=motion) if answer.stands else _refused(world, [motion], answer.falling, 0)
 
 
 def _ask(world: AssemblyGeometry, there: int, motion: StepMotion, hold: int) -> Standing:

@@ -111,7 +111,7 @@ def stands_at_first(setting: Setting) -> Derived:
         answer = world.stability.standing_when_held(there, setting.held)
         if answer.stands:
             return Verdict(True)
-        falling = world.in_mask(answer.moving)
+        falling = world.in_mask(answer.falling)
         said = f"The assembly does not stand as it is: {listed(falling)} would fall."
         return Verdict(False, falling, said, ())
 

@@ -110,7 +110,7 @@ class Splitter:
             held = self.assembly.mask(motion.held)
             answer = self.geometry.stability.standing(rest, held=held)
             if not answer.stands:
-                falling = self.assembly.in_mask(answer.moving)
+                falling = self.assembly.in_mask(answer.falling)
                 return Verdict(False, falling, f"Without {said}, {listed(falling)} would fall.")
             if self.setting.pull:
                 return checked_while_drawn(self.geometry, block.parts, motion)

@@ -56,7 +56,7 @@ def explain_removal(
     unproved: list[str] = []
     whole = geometry.stability.standing_when_held(there, setting.held) if setting.gravity else None
     if whole is not None and not whole.stands:
-        falls.append(fall(geometry, there, 0, whole.moving, setting.held))
+        falls.append(fall(geometry, there, 0, whole.falling, setting.held))
     for part in bits(there & ~geometry.assembly.fixed_mask):
         name = geometry.names[part]
         if not graph.free_directions(part, there):
@@ -72,7 +72,7 @@ def explain_removal(
             answer = geometry.stability.standing_when_held(there & ~(1 << part), setting.held)
             if not answer.stands:
                 told = len(falls) < LISTED
-                falls.append(fall(geometry, there, 1 << part, answer.moving, setting.held, told=told))
+                falls.append(fall(geometry, there, 1 << part, answer.falling, setting.held, told=told))
             elif setting.pull:
                 drawn = drawn_part(geometry, setting, there, part)
                 if not drawn.holds:
@@ -156,5 +156,5 @@ def _falls_of_groups(geometry: AssemblyGeometry, setting: Setting, block: Block,
             answer = geometry.stability.standing_when_held(block.parts & ~leaving, setting.held)
             if not answer.stands:
                 told = len(found) < LISTED
-                found[leaving] = fall(geometry, block.parts, leaving, answer.moving, setting.held, told=told)
+                found[leaving] = fall(geometry, block.parts, leaving, answer.falling, setting.held, told=told)
     return list(found.values())

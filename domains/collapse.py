@@ -216,7 +216,7 @@ def check_standing(geometry: AssemblyGeometry, rule: str) -> None:
     if rule == "rigid":
         standing = geometry.stability.standing(present)
         if not standing.stands:
-            falling = ", ".join(world.in_mask(standing.moving))
+            falling = ", ".join(world.in_mask(standing.falling))
             raise AssemblyError(
                 f"Expected a puzzle that stands by itself; {falling} would fall at once. Support it, or raise the "
                 f"friction (it is {world.friction:g})."

@@ -145,7 +145,7 @@ class ReferenceTower:
     def falling(self, height: int) -> tuple[int, ...]:
         """Which levels (from 0) would fall when the lowest `height` stood by themselves; none: they stand."""
         answer = self.geometry.stability.standing((1 << height) - 1)
-        return () if answer.stands else tuple(i for i in range(height) if answer.moving >> i & 1)
+        return () if answer.stands else tuple(i for i in range(height) if answer.falling >> i & 1)
 
     def built(self, order: Sequence[str]) -> Assembly:
         """The tower that these blocks make, from the bottom up: parts on the levels' places, named after the blocks.

@@ -76,7 +76,7 @@ def test_answers_are_those_of_the_linear_program(local, cells, data):
         if local:
             patch.setattr(module, "SMALL", 0)
         assembly = ns.Assembly.from_cells(cells)
-        quick, slow = AssemblyGeometry(assembly).stability, AssemblyGeometry(assembly, tabulate=False).stability
+        quick, slow = AssemblyGeometry(assembly).limit, AssemblyGeometry(assembly, tabulate=False).limit
         subset = (1 << len(cells)) - 1
         for part in data.draw(st.permutations(range(len(cells)))):
             held = data.draw(st.sampled_from([0, 0, 1 << data.draw(st.integers(0, len(cells) - 1))]))
@@ -145,9 +145,11 @@ def test_verdicts_do_not_depend_on_pose_scale_or_names(turns, shift, scale, name
     for d in range(len(directions)):
         assert [after.by_part[d][k] for k in range(7)] == [renamed(before.by_part[d][old]) for old in place]
     for block in range(7):
-        a = first.stability.standing(full & ~(1 << block))
-        b = second.stability.standing(full & ~(1 << place.index(block)))
+        a = first.limit.standing(full & ~(1 << block))
+        b = second.limit.standing(full & ~(1 << place.index(block)))
         assert (b.stands, b.moving) == (a.stands, renamed(a.moving))
+        by_springs = [g.springs.standing(full & ~(1 << k)) for g, k in ((first, block), (second, place.index(block)))]
+        assert by_springs[0].stands is by_springs[1].stands
 
 
 def test_light_parts_count_and_heavy_ones_may_rest_on_them():
@@ -352,7 +354,7 @@ def test_the_wall_comes_apart_from_above():
 def test_a_dome_of_527_stands_on_its_fixed_ring():
     assembly = structure("dome")
     geometry = AssemblyGeometry(assembly)
-    stability, full = geometry.stability, (1 << 527) - 1
+    stability, full = geometry.limit, (1 << 527) - 1
     assert stability.standing(full).stands
     graph = geometry.blocking("+z")
     assert sum(graph.blockers(p, 0, full) == 0 for p in range(527)) == 31
@@ -371,7 +373,7 @@ def test_newtons_method_converges_on_all_of_a_dome_at_once():
     from neurosym.geometry.stability.equilibrium import QUICK, THOROUGH
 
     assembly = structure("dome")
-    equilibrium, stone = AssemblyGeometry(assembly).stability.equilibrium, assembly.index["408"]
+    equilibrium, stone = AssemblyGeometry(assembly).limit.equilibrium, assembly.index["408"]
     loose = np.array([not assembly.fixed_mask >> k & 1 and k != stone for k in range(527)] + [False])
     between = (loose[equilibrium.a] | loose[equilibrium.b]) & (equilibrium.a != stone) & (equilibrium.b != stone)
     parts, corners = np.flatnonzero(loose), np.flatnonzero(between)

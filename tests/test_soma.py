@@ -319,7 +319,14 @@ def test_pieces_that_overlap_or_overhang_are_refused():
     for rule in ("cubes", "strict"):
         with pytest.raises(ns.AssemblyError, match="squarely"):
             soma.problem_from_assembly(across, collapse=rule)
-    assert orders(soma.problem_from_assembly(across, collapse="rigid")) == {("c", "a", "b"), ("c", "b", "a")}
+    # Exactly over an edge it stands, as in simulation.
+    assert orders(soma.problem_from_assembly(across, collapse="rigid")) == {
+        ("c", "a", "b"), ("c", "b", "a"), ("a", "c", "b"), ("b", "c", "a")
+    }  # fmt: skip
+    leaning = boxes({"a": [(0.5, 0.5, 0.5)], "b": [(1.5, 0.5, 0.5)], "c": [(1.1, 0.5, 1.5)]})
+    assert orders(soma.problem_from_assembly(leaning, collapse="rigid")) == {
+        ("c", "a", "b"), ("c", "b", "a"), ("a", "c", "b")
+    }  # fmt: skip
 
 
 @pytest.mark.parametrize(

@@ -16,11 +16,11 @@ from neurosym.geometry.contact.contacts import Contact
 from neurosym.geometry.queries import AssemblyGeometry
 from neurosym.geometry.shapes import Body, Box, Part
 from neurosym.geometry.stability.contact_springs import contact_springs
+from neurosym.geometry.stability.of_assembly import spring_stability as with_contacts
 from neurosym.geometry.stability.settling import settle
 from neurosym.geometry.stability.spring_loads import drag, margin, standing_while_pulled
-from neurosym.geometry.stability.spring_stability import DOWN, SpringStability
-from neurosym.geometry.stability.spring_stability import spring_stability as with_contacts
-from neurosym.geometry.stability.springs import DEFAULT_NUMBERS
+from neurosym.geometry.stability.spring_stability import SpringStability
+from neurosym.geometry.stability.springs import DEFAULT_NUMBERS, DOWN
 from neurosym.geometry.tolerances import Tolerances
 from neurosym.simulation.world import stands as simulated
 

@@ -162,7 +162,7 @@ class AssemblyGeometry:
     @cached_property
     def springs(self) -> SpringStability:
         """Which subsets come to rest on springs, with what moves, forces at contacts, margins and drag."""
-        from neurosym.geometry.stability.spring_stability import spring_stability
+        from neurosym.geometry.stability.of_assembly import spring_stability
 
         return spring_stability(self.assembly, self.contacts, remember=self.tabulate, tilt=self.tilt)
 

@@ -141,7 +141,7 @@ def stable_without(present: Fluent, *, removal: bool = True, held: int = 0) -> D
         rest = state.mask(present, world.names) & ~(1 << world.index[p])
         if world.stability.standing(rest, held=world.mask(hands)).stands:
             return Verdict(True, (), f"The others stand without {p}.", motion=motion)
-        return ask(world, state, p) if not hands else _falls(world, world.stability.standing(rest).moving, (p,), held)
+        return ask(world, state, p) if not hands else _falls(world, world.stability.standing(rest).falling, (p,), held)
 
     def formula(world: AssemblyGeometry, p: str) -> formulas.Stands:
         return formulas.Stands(present, p, held)
@@ -163,10 +163,12 @@ def stands(
     if answer.stands:
         motion = StepMotion(held=world.in_mask(answer.held)) if answer.held else None
         return Verdict(True, (), f"The others stand without {said}.", motion=motion)
-    verdict = _falls(world, answer.moving, leaving, held)
-    # The motion stays possible while every part that moves in it is there, whatever else has left.
-    until = None if present is None or not answer.promises else tuple(Atom(present, (n,)) for n in verdict.because)
-    return replace(verdict, until=until)
+    # The motion stays possible while every part that moves in it is there. Those that go along are named besides: that
+    # promises less, and gives planners more to try next.
+    verdict = _falls(world, answer.falling, leaving, held)
+    if present is None or not answer.promises:
+        return verdict
+    return replace(verdict, until=tuple(Atom(present, (n,)) for n in verdict.because))
 
 
 def _falls(world: AssemblyGeometry, moving: int, leaving: Sequence[str], held: int) -> Verdict:

@@ -115,7 +115,7 @@ def inspect_problem(problem: Problem, *, margin: bool = False) -> Inspection:
         balanced=balanced,
         movements=tuple(m.sentence(world.names) for m in moves),
         margin=_margin(world, everything, standing.held) if margin and gravity else None,
-        falls=() if stands else world.in_mask(standing.moving),
+        falls=() if stands else world.in_mask(standing.falling),
         held=world.in_mask(standing.held) if stands else (),
         notes=tuple(map(str, world.assembly.notes)),
     )

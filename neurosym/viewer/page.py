@@ -117,6 +117,8 @@ class Page:
         self.play = gui.add_button("Play", icon=viser.Icon.PLAYER_PLAY, disabled=True)
         self.speed = gui.add_dropdown("Speed", SPEEDS, initial_value="1×")
         self.names = gui.add_checkbox("Names of parts", False)
+        self.forces = gui.add_checkbox("Contact forces", False, hint="between steps; red: about to slip")
+        self.forces_text = gui.add_html("")
         tabs = gui.add_tab_group()
         with tabs.add_tab("Plan"):
             self.plan_tab = gui.add_html("")
@@ -134,6 +136,7 @@ class Page:
         self.slider.on_update(lambda _: self._moved(self.slider.value))
         self.play.on_click(lambda _: self._toggle())
         self.names.on_update(lambda _: self.scene.name_parts(self.names.value))
+        self.forces.on_update(lambda _: self._show_forces())
         self.part.on_update(lambda _: self._picked(self.part.value))
         self.refusal.on_update(lambda _: self._look_at(self.refusal.value))
         self.form.again.on_click(lambda _: self._again())
@@ -156,6 +159,7 @@ class Page:
                 self.plan_tab.content = panels.styled(panels.overview(exhibit) + steps(exhibit, now))
                 self.caption.content = panels.styled(caption(exhibit, t))
                 self._tell_facts()
+                self._show_forces()
 
     def _toggle(self) -> None:
         with self._lock:
@@ -233,6 +237,23 @@ class Page:
             self.part_tab.content = panels.styled(panels.facts(part_facts(timeline.geometry, name, there)))
         except REFUSED as error:
             self.part_tab.content = panels.styled(panels.message(str(error)))
+
+    def _show_forces(self) -> None:
+        """Between steps, and where they are asked for, contact forces of the parts in place, or how these fall."""
+        with self._lock:
+            timeline = self.exhibit.timeline if self.exhibit else None
+            self.scene.show_forces(None)
+            self.forces_text.content = ""
+            if timeline is None or not self.forces.value or timeline.step_at(self.slider.value) is not None:
+                return
+            geometry = timeline.geometry
+            there = geometry.mask(timeline.state_at(self.slider.value))
+            try:
+                self.scene.show_forces(geometry.springs.forces(there))
+                moves = [m.sentence(geometry.names) for m in geometry.springs.movements(there)]
+                self.forces_text.content = panels.styled(panels.falls(moves)) if moves else ""
+            except REFUSED as error:
+                self.forces_text.content = panels.styled(panels.message(str(error)))
 
     def _again(self) -> None:
         try:

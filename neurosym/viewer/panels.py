@@ -85,6 +85,13 @@ def facts(part: PartFacts) -> str:
     )
 
 
+def falls(movements: Sequence[str]) -> str:
+    """How parts begin to fall, in sentences."""
+    more = f"<li>and {len(movements) - 6} more</li>" if len(movements) > 6 else ""
+    listed = "".join(f"<li>{escape(sentence)}</li>" for sentence in movements[:6])
+    return f"<p>It does not stand by itself:</p><ul>{listed}{more}</ul>"
+
+
 def _names(names: Sequence[str], also: str = "") -> str:
     return escape(", ".join(filter(None, [some(names), also]))) or "<span class='quiet'>nothing</span>"
 

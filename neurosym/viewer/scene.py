@@ -9,6 +9,7 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
+from neurosym.geometry.stability.spring_verdicts import ContactForces
 from neurosym.simulation.scene import part_colours
 from neurosym.viewer.solids import Solid, solids
 from neurosym.viewer.steps import HELD
@@ -42,6 +43,9 @@ SKY, SUN, SUN_FROM = ((255, 255, 255), (165, 165, 170), 2.2), 2.0, np.array([-0.
 
 _EDGE, _PICKED = (45, 45, 45), (213, 94, 0)
 
+#: Forces at contacts: how long the largest is, and the colours of one without friction and of one that slips.
+_LONGEST, _FIRM, _SLIPS = 0.35 * SIZE, np.array([0, 158, 115]), np.array([213, 94, 0])
+
 
 def named_at_first(timeline: Timeline | None) -> bool:
     """Whether parts bear their names before anybody asks: where they are few, and no picture says what they are."""
@@ -69,6 +73,7 @@ class PlanScene:
         self._outlines: dict[str, viser.LineSegmentsHandle] = {}
         self._path: viser.LineSegmentsHandle | None = None
         self._path_step: int | None = None
+        self._arrows: viser.ArrowsHandle | None = None
         self._standing_out: Mapping[str, RGB | None] | None = None
         self._held: frozenset[str] = frozenset()
 
@@ -201,6 +206,26 @@ class PlanScene:
                 # Of few parts the outlines say what is where; of many they would hide those that stand out.
                 if name in self._outlines:
                     self._outlines[name].visible = chosen or len(self.parts) <= MOST_NAMES
+
+    def show_forces(self, forces: ContactForces | None) -> None:
+        """Arrows of the forces at contacts, on whichever part each lifts, redder the nearer they are to slipping."""
+        if self._arrows is not None:
+            self._arrows.remove()
+            self._arrows = None
+        if forces is None or not len(forces.forces):
+            return
+        lift = np.where(forces.forces[:, 2] < 0, -1.0, 1.0)[:, None] * forces.forces
+        start = self._to_scene(forces.points)
+        ends = start + lift * (_LONGEST / np.linalg.norm(lift, axis=1).max())
+        colours = _FIRM + forces.slipping[:, None] * (_SLIPS - _FIRM)
+        self._arrows = self.server.scene.add_arrows(
+            "/parts/forces",
+            np.stack([start, ends], axis=1),
+            colours.astype(np.uint8),
+            shaft_radius=0.004 * SIZE,
+            head_radius=0.012 * SIZE,
+            head_length=0.03 * SIZE,
+        )
 
     def name_parts(self, visible: bool) -> None:
         """Show or hide the parts' names."""

@@ -28,6 +28,11 @@ class Standing:
         """Whether any smaller subset falls while all of `moving` are there, none of them held."""
         return not self.stands
 
+    @property
+    def falling(self) -> int:
+        """A bitset of all that falls, as far as it is known: `moving`, and what goes along."""
+        return self.moving
+
 
 def parts_to_hold(standing: Callable[[int], Standing], hands: int, most: int) -> tuple[int | None, list[int]]:
     """What to hold, `most` parts at the most, so that a subset stands.

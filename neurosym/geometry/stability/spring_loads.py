@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from neurosym.geometry.stability.spring_stability import SpringStability, tilted
+from neurosym.geometry.stability.spring_stability import SpringStability
 from neurosym.geometry.stability.spring_verdicts import SpringStanding, moving_parts
+from neurosym.geometry.stability.springs import tilted
 from neurosym.support.arrays import Array
 
 #: Halvings of the angle from 90 degrees: to 0.2 degrees.
@@ -60,12 +61,16 @@ def standing_while_pulled(
 ) -> SpringStanding:
     """Whether a subset stands as some of its parts begin to be drawn along a direction (3,).
 
-    What touches those parts is dragged along. They themselves go where they are drawn: they still carry what lies on
-    them, but hold nothing by friction. Only what hangs together with them is looked at.
+    What touches those parts is dragged along. They themselves weigh and carry as before, but hold nothing by friction;
+    where they would fall by that, whoever draws them holds them. Only what hangs together with them is looked at.
     """
     movable = subset & ~held & ~stability.fixed
     near = sum(group for group in stability.groups(movable) if group & leaving)
     around = stability.next_to(near) & subset & ~movable
     loads = drag(stability, near | around, leaving, direction, around)
-    settled = stability.settled(near | around, around | leaving, loads=loads, slippery=leaving)
-    return SpringStanding(settled.stands, 0 if settled.stands else moving_parts(settled), held)
+    there = near | around
+    if not loads:
+        return SpringStanding(True, 0, held)
+    alone = stability.settled(there, around, slippery=leaving).stands
+    settled = stability.settled(there, around if alone else around | leaving, loads=loads, slippery=leaving)
+    return SpringStanding(settled.stands, 0 if settled.stands else moving_parts(settled) & ~leaving, held)

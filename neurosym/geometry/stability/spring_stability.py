@@ -8,12 +8,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.contact.contacts import Contact
 from neurosym.geometry.stability.contact_springs import contact_springs
 from neurosym.geometry.stability.holding import parts_to_hold
 from neurosym.geometry.stability.load_paths import LEVEL, LoadPaths
-from neurosym.geometry.stability.patches import masses, merged_patches, neighbours
+from neurosym.geometry.stability.patches import neighbours
 from neurosym.geometry.stability.settling import Settled, settle
 from neurosym.geometry.stability.spring_verdicts import (
     ContactForces,
@@ -23,20 +22,10 @@ from neurosym.geometry.stability.spring_verdicts import (
     movements,
     moving_parts,
 )
-from neurosym.geometry.stability.springs import DEFAULT_NUMBERS, SpringNumbers, Springs
+from neurosym.geometry.stability.springs import DEFAULT_NUMBERS, DOWN, SpringNumbers, Springs, tilted
 from neurosym.geometry.stability.standing import Stability
 from neurosym.support.arrays import Array, Truths
 from neurosym.support.bitsets import bits
-
-#: Gravity.
-DOWN = np.array([0.0, 0.0, -1.0])
-
-
-def tilted(gravity: Array, degrees: float) -> Array:
-    """float64 (4, 3): gravity tilted by so many degrees in each of four horizontal directions."""
-    angle = np.radians(degrees)
-    sideways = np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -1.0, 0.0]])
-    return np.asarray(np.cos(angle) * gravity + np.sin(angle) * sideways)
 
 
 class SpringStability:
@@ -147,7 +136,9 @@ class SpringStability:
         held, motions = parts_to_hold(ask, hands, most)
         if held is not None:
             return SpringStanding(True, 0, held)
-        return SpringStanding(False, functools.reduce(int.__or__, motions, 0), balanced=not promises)
+        moving = functools.reduce(int.__or__, motions, 0)
+        movable = subset & ~self.fixed
+        return SpringStanding(False, moving, 0, not promises, self._carried_by(moving, movable, subset))
 
     def groups(self, movable: int) -> list[int]:
         """Bitsets of movable parts that hang together by contacts."""
@@ -221,6 +212,8 @@ class SpringStability:
                 if not settled.stands:
                     answer = SpringStanding(False, moving_parts(settled))
                     break
+            if not answer.stands:
+                answer = replace(answer, along=self._carried_by(answer.moving, group, group | around))
             if self.remember:
                 self._groups[group, around] = answer
         return answer
@@ -277,43 +270,19 @@ class SpringStability:
         """Bitset of the parts that touch some of those in a bitset."""
         return functools.reduce(int.__or__, (self.touching[p] for p in bits(parts)), 0)
 
+    def _carried_by(self, falling: int, group: int, there: int) -> int:
+        """Bitset of the parts of a group that lie on nothing but what falls."""
+        carried, known = 0, -1
+        while carried != known:
+            known = carried
+            for part in bits(group & ~(falling | carried | self.on_table)):
+                below = self.supports[part] & there
+                if below and not below & ~(falling | carried):
+                    carried |= 1 << part
+        return carried
+
     def _mask(self, parts: int) -> Truths:
         """bool (n + 1,): a bitset; the last stands for the table."""
         mask = np.zeros(len(self.masses) + 1, dtype=bool)
         mask[bits(parts)] = True
         return mask
-
-
-def spring_stability(
-    assembly: Assembly,
-    contacts: tuple[Contact, ...],
-    *,
-    gravity: Array = DOWN,
-    tilt: float = 0.0,
-    numbers: SpringNumbers = DEFAULT_NUMBERS,
-    remember: bool = True,
-) -> SpringStability:
-    """The stability of an assembly with these contacts, by springs.
-
-    Faces that touch, but are further apart than `Tolerances.play`, close that gap first: what drops by its play and
-    then rests, stands.
-    """
-    # No patch is shrunk: limit analysis is to refute only what no forces can hold.
-    exact = replace(assembly, tolerances=replace(assembly.tolerances, patch_shrink=0.0))
-    patches = merged_patches(exact, contacts)
-    gaps = np.array([p.gap for p in patches])
-    gaps[gaps <= assembly.tolerances.play * assembly.smallest_extent] = 0.0
-    mass, centres = masses(assembly)
-    return SpringStability(
-        patches,
-        mass,
-        centres,
-        friction=assembly.friction,
-        limit=functools.partial(Stability, exact, contacts, remember=remember),
-        fixed=assembly.fixed_mask,
-        gaps=gaps,
-        gravity=gravity,
-        tilt=tilt,
-        numbers=numbers,
-        remember=remember,
-    )

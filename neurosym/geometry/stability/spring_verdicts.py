@@ -55,13 +55,19 @@ class SpringStanding(Standing):
     Attributes:
         balanced: False where limit analysis proves that no forces balance `moving`: a nogood as `Standing` has it.
             A fall where this is True promises nothing.
+        along: bitset of the parts that lie on nothing but what falls.
     """
 
     balanced: bool = True
+    along: int = 0
 
     @property
     def promises(self) -> bool:
         return not self.stands and not self.balanced
+
+    @property
+    def falling(self) -> int:
+        return self.moving | self.along
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,6 +19,9 @@ import numpy as np
 
 from neurosym.support.arrays import Array, Numbers, Truths
 
+#: Gravity.
+DOWN = np.array([0.0, 0.0, -1.0])
+
 
 @dataclass(frozen=True)
 class SpringNumbers:
@@ -105,3 +108,10 @@ class Springs:
     def corners_of(self, there: Truths, moving: Truths) -> Numbers:
         """Corners between parts that are there, one of them moving at least; masks bool (n + 1,), the table's last."""
         return np.flatnonzero(there[self.a] & there[self.b] & (moving[self.a] | moving[self.b]))
+
+
+def tilted(gravity: Array, degrees: float) -> Array:
+    """float64 (4, 3): gravity tilted by so many degrees in each of four horizontal directions."""
+    angle = np.radians(degrees)
+    sideways = np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -1.0, 0.0]])
+    return np.asarray(np.cos(angle) * gravity + np.sin(angle) * sideways)
