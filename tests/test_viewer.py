@@ -849,6 +849,30 @@ def test_the_model_loads_no_viser():
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
+def test_forces_at_contacts_are_arrows_between_steps(exhibit):
+    from neurosym.viewer.page import Page
+    from neurosym.viewer.server import LocalServer
+
+    server = LocalServer(label="neurosym")
+    viewer = Page(server, Query("soma", 17))
+    viewer.show(exhibit)
+    assert viewer.scene._arrows is None
+    viewer.forces.value = True
+    points = viewer.scene._arrows.points
+    assert points.shape[1:] == (2, 3)
+    assert (points[:, 1, 2] >= points[:, 0, 2] - 1e-6).all()  # on whichever part each lifts
+    viewer._moved(0.5)
+    viewer.slider.value = 0.5
+    assert viewer.scene._arrows is None
+    viewer.slider.value = 1.0
+    assert viewer.scene._arrows is not None
+    assert len(viewer.scene._arrows.points) != len(points) or (viewer.scene._arrows.points != points).any()
+    viewer.forces.value = False
+    assert viewer.scene._arrows is None
+    viewer.close()
+    server.stop()
+
+
 # -- the page -----------------------------------------------------------------------------------------------------
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
