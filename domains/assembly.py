@@ -6,7 +6,7 @@ reversed is an insertion.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,9 +19,10 @@ from domains.assembly_samples import SAMPLES, TRAINING, sample
 from neurosym.errors import AssemblyError, InputError, UnknownNameError
 from neurosym.geometry.assembly import NO_TABLE, Assembly
 from neurosym.geometry.blocking.directions import Directions
+from neurosym.geometry.keeping import keep_together
 from neurosym.geometry.queries import AssemblyGeometry
 from neurosym.language import Problem
-from neurosym.language.problem import as_names
+from neurosym.language.problem import as_names, checked_pairs
 from neurosym.language.problem_family import ProblemFamily
 
 #: What `paths` may be.
@@ -75,6 +76,7 @@ class AssemblyFamily(ProblemFamily):
         fixed: Iterable[str] = (),
         ground: float | bool | None = None,
         before: Iterable[tuple[str, str]] = (),
+        keep: Iterable[str | Sequence[str]] = (),
         units: str | None = None,
         name: str = "",
     ) -> Problem:
@@ -101,6 +103,10 @@ class AssemblyFamily(ProblemFamily):
                 point; False: none; None: under the lowest point (or where the assembly has its table) with gravity,
                 none without.
             before: pairs of names of parts: the first must leave before the second.
+            keep: groups of names of parts, or names of sub-assemblies, that are one part each, throughout: blocked by
+                others only, standing, leaving and counted as one (`neurosym.geometry.keeping`). What a BurrTools file
+                or an assembly's JSON calls a piece group is less: its parts move by themselves, and the task is done
+                once all that is still together is within one group.
             units: of the files' lengths, where the files do not say.
             name: of the problem; default the file's, or the sample's.
 
@@ -113,6 +119,9 @@ class AssemblyFamily(ProblemFamily):
         if pull and not (gravity and stability == "springs"):
             raise InputError('Expected pull=True under gravity with stability="springs", which alone knows what drags.')
         assembly = assembly.with_fixed(dict.fromkeys((*assembly.fixed, *as_names(fixed, "fixed"))))
+        kept = keep_together(assembly, keep)
+        assembly = kept.assembly
+        before = [(kept.name(a), kept.name(b)) for a, b in checked_pairs(before, "the domain 'assembly'")]
         assembly = assembly.with_table(_table(assembly, gravity, ground))
         if len(assembly.fixed) == len(assembly):
             raise InputError(f"Expected a part that is not fixed, to take out; all {len(assembly)} are. Fix fewer.")
@@ -126,6 +135,7 @@ class AssemblyFamily(ProblemFamily):
             "fixed": list(assembly.fixed),
             "stability": stability,
             "tilt": geometry.tilt,
+            "keep": [list(group) for group in kept.groups],
             **{key: getattr(setting, key) for key in ("paths", "groups", "gravity", "held", "pull")},
         }
         make = apart_in_groups if groups else apart_one_by_one

@@ -25,6 +25,7 @@ from typing import TYPE_CHECKING, Any
 from domains.assembly_splits import Block, Splitter
 from domains.assembly_why import explain_groups
 from neurosym.errors import InputError
+from neurosym.geometry.grouping import need_not_part
 from neurosym.geometry.queries import AssemblyGeometry
 from neurosym.geometry.step_motion import StepMotion
 from neurosym.language import Action, Domain, Fluent, GroundProblem, Problem, Type
@@ -137,7 +138,7 @@ class GroupSemantics(Semantics):
                 grounded = block - leaving
             anchors.add(name)
         together = [b for b in blocks if len(b - set(self.assembly.fixed)) + bool(b & set(self.assembly.fixed)) > 1]
-        if together:
+        if together and not need_not_part(together, self.assembly.piece_groups):
             left = tuple(n for n in world.names if n in together[0])
             said = f"After all {len(order)} actions the goal is missed: {listed(left)} are still together."
             return Validation(False, len(order), left, said)
@@ -160,6 +161,7 @@ class GroupSemantics(Semantics):
         splitter = Splitter(self.geometry, relaxed)
         waiting = [(Block((1 << len(self.assembly)) - 1, self.standing), self.anchors)]
         done: list[str] = []
+        stuck: list[tuple[Block, dict[str, Rejection]]] = []
         while waiting:
             block, kept = waiting.pop()
             refused = {}
@@ -176,9 +178,16 @@ class GroupSemantics(Semantics):
                 refused[self.assembly.names[number]] = Rejection(verdict.reason, verdict.because, proved=verdict.proved)
             else:
                 if refused and all(r.proved for r in refused.values()):
-                    why = explain_groups(self.geometry, relaxed, tuple(done), [block], refused)
-                    return replace(why, relaxed=self.setting.gravity)
+                    stuck.append((block, refused))
+                    if not self.may_stay([b for b, _ in stuck]):
+                        blocks, rejections = [b for b, _ in stuck], {k: r for _, own in stuck for k, r in own.items()}
+                        why = explain_groups(self.geometry, relaxed, tuple(done), blocks, rejections)
+                        return replace(why, relaxed=self.setting.gravity)
         return None
+
+    def may_stay(self, blocks: Sequence[Block]) -> bool:
+        """Whether blocks need not come apart: each is within one piece group."""
+        return need_not_part([self.assembly.in_mask(b.parts) for b in blocks], self.assembly.piece_groups)
 
     def explain(self, problem: Problem, done: Sequence[str]) -> WhyNot | None:
         """Why the blocks that are left after the longest prefix do not come apart."""
@@ -211,7 +220,9 @@ class GroupSearch:
         self._at_first: Verdict | None = None
 
     def is_goal(self, state: State) -> bool:
-        return self.symbols.is_goal(state[0])
+        if self.symbols.is_goal(state[0]):
+            return True
+        return bool(self.assembly.piece_groups) and self.rules.may_stay(self.blocks(state))
 
     def candidates(self, state: State) -> list[int]:
         return self.symbols.candidates(state[0])

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 from domains.assembly_paths import NoWay, check_motion, way_out
 from domains.assembly_pull import drawn_out
 from domains.assembly_why import explain_removal, refute_removal
+from neurosym.geometry.assembly import Assembly
+from neurosym.geometry.grouping import need_not_part
 from neurosym.geometry.queries import AssemblyGeometry
 from neurosym.geometry.step_motion import StepMotion
 from neurosym.language import Action, Derived, Domain, Fluent, Problem, Simulation, State, Type, formulas, predicates
@@ -49,12 +51,13 @@ def apart_one_by_one(
     """The problem in which an action, named by a part, removes that part."""
     assembly = world.assembly
     loose = [n for n in assembly.names if n not in assembly.fixed]
+    goal = [need_not_separate(assembly)()] if assembly.piece_groups else [~present(n) for n in loose]
     judged_alike = setting.gravity and not setting.held and not assembly.fixed and setting.paths == "straight"
     return removal_domain(setting).problem(
         world=world,
         objects={part: assembly.names},
         init=[*(present(n) for n in assembly.names), *(fixed(n) for n in assembly.fixed)],
-        goal=[~present(n) for n in loose],
+        goal=goal,
         before=before,
         name=name,
         family=family,
@@ -99,6 +102,18 @@ def can_leave(setting: Setting) -> Derived:
         return check_motion(world, setting, motion, state.mask(present, world.names), standing=True)
 
     return Derived("free", [part], ask, check=check, formula=straight.formula if setting.paths == "straight" else None)
+
+
+def need_not_separate(assembly: Assembly) -> Derived:
+    """``need_not_separate()``: nothing but fixed parts is left, or all that is left is within one piece group."""
+
+    def ask(world: AssemblyGeometry, state: State) -> Verdict:
+        left = state.objects(present)
+        if set(left) <= set(assembly.fixed) or need_not_part([left], assembly.piece_groups):
+            return Verdict(True)
+        return Verdict(False, left, f"{listed(left)} are left, which are not within one piece group.")
+
+    return Derived("need_not_separate", [], ask)
 
 
 def stands_at_first(setting: Setting) -> Derived:
