@@ -34,7 +34,9 @@ def refute_removal(geometry: AssemblyGeometry, setting: Setting) -> WhyNot | Non
         done += free
         there &= ~sum(1 << p for p in free)
     kept = there & ~geometry.assembly.fixed_mask
-    if not kept or need_not_part([geometry.in_mask(there)], geometry.assembly.piece_groups):
+    if setting.targets and not kept & geometry.mask(setting.targets):
+        return None
+    if not kept or (not setting.targets and need_not_part([geometry.in_mask(there)], geometry.assembly.piece_groups)):
         return None
     return WhyNot(
         after=tuple(geometry.names[p] for p in done),

@@ -200,6 +200,11 @@ class RemovalOptions:
         typer.Option(metavar="A,B", help="Parts, or a sub-assembly, that are one part throughout. May be repeated."),
     ] = None
 
+    target: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME", help="Take out only what has to go before this part, and it. May be repeated."),
+    ] = None
+
     def given(self) -> dict[str, Any]:
         """Those that were given, as `problem` of the domain "assembly" takes them."""
         options = vars(self) | {"keep": [[name.strip() for name in text.split(",")] for text in self.keep or []]}
