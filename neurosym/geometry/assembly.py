@@ -72,9 +72,10 @@ class Assembly:
         if not (isinstance(self.friction, int | float | np.number) and 0.0 <= self.friction < np.inf):
             raise AssemblyError(f"Expected a coefficient of friction of 0 or more; got {self.friction!r}.")
         check_fixed(self.fixed, names)
-        for name in (n for group in self.piece_groups for n in group.names):
-            if name not in names:
-                raise UnknownNameError("part of a piece group", name, names)
+        grouped = {"piece group": [g.names for g in self.piece_groups], "sub-assembly": self.subassemblies.values()}
+        for what, groups in grouped.items():
+            if strange := [n for own in groups for n in own if n not in names]:
+                raise UnknownNameError(f"part of a {what}", strange[0], names)
 
     @classmethod
     def from_cells(
