@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from broken_inputs import write
+from broken_inputs import model_3mf, object_3mf, write, zipped
 from hypothesis import given
 from hypothesis import strategies as st
 from step_files import step_bolted
@@ -213,6 +213,30 @@ def test_nodes_of_a_scene_are_sub_assemblies(tmp_path: Path):
     assembly = ns.Assembly.load(tmp_path / "a.glb")
     assert assembly.subassemblies == {"left": ("a", "b")}
     assert keep_together(assembly, ["left"]).assembly.names == ("left", "c")
+
+
+def test_components_of_3mf_are_sub_assemblies(tmp_path: Path):
+    moved = ("1 0 0 0 1 0 0 0 1 0 0 0", "1 0 0 0 1 0 0 0 1 3 0 0")
+    components = "".join(f'<component objectid="1" transform="{m}"/>' for m in moved)
+    pair = f'<object id="2" name="pair"><components>{components}</components></object>'
+    items = "".join(f'<item objectid="2" transform="1 0 0 0 1 0 0 0 1 0 {y} 0"/>' for y in (0, 5))
+    assembly = ns.Assembly.load(zipped(tmp_path, model_3mf(object_3mf(1) + pair, items)))
+    assert [len(parts) for parts in assembly.subassemblies.values()] == [2, 2]
+    assert keep_together(assembly, ["pair (2)"]).assembly.names[-1] == "pair (2)"
+
+
+@pytest.mark.parametrize("ending", [".json", ".step"])
+def test_a_page_and_a_simulation_show_what_is_kept_together(ending: str, tmp_path: Path):
+    if ending == ".step":
+        pytest.importorskip("cascadio")
+        path, options = write(tmp_path / "a.step", step_bolted("mm", 1.0)), ["--keep", "BOLT,NUT", "--target", "BOLT"]
+    else:
+        path, options = tmp_path / "a.json", ["--keep", "shell,ball"]
+        ns.Assembly.from_cells(BOXED).save(path)
+    pytest.importorskip("viser")
+    shown = run("view", path, *options, "--no-gravity", "--export", tmp_path / "page.html")
+    assert (shown.exit_code, shown.exception) == (0, None)
+    assert (tmp_path / "page.html").stat().st_size > 10_000
 
 
 # -- not to be separated ----------------------------------------------------------------------------------------
