@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from broken_inputs import model_3mf, object_3mf, write, zipped
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from step_files import step_bolted
 from typer.testing import CliRunner
@@ -90,6 +90,7 @@ def test_what_is_kept_together_is_one_thing():
 cells = st.sets(st.tuples(*[st.integers(0, 2)] * 3), min_size=6, max_size=12)
 
 
+@settings(deadline=None)
 @given(cells, st.data())
 def test_every_step_is_possible_for_the_parts_themselves(taken: set[tuple[int, int, int]], data: st.DataObject):
     owners = {c: data.draw(st.integers(0, 4), label=str(c)) for c in sorted(taken)}
