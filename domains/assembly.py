@@ -6,7 +6,7 @@ reversed is an insertion.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,9 +19,10 @@ from domains.assembly_samples import SAMPLES, TRAINING, sample
 from neurosym.errors import AssemblyError, InputError, UnknownNameError
 from neurosym.geometry.assembly import NO_TABLE, Assembly
 from neurosym.geometry.blocking.directions import Directions
+from neurosym.geometry.keeping import keep_together
 from neurosym.geometry.queries import AssemblyGeometry
 from neurosym.language import Problem
-from neurosym.language.problem import as_names
+from neurosym.language.problem import as_names, checked_pairs
 from neurosym.language.problem_family import ProblemFamily
 
 #: What `paths` may be.
@@ -39,6 +40,7 @@ class Setting:
         gravity: whether what stays must stand.
         held: how many parts may be held meanwhile.
         pull: whether what stays must stand while the others are drawn out against friction, too.
+        targets: names of the parts that are to be out; empty: all that are not fixed.
     """
 
     directions: tuple[tuple[float, float, float], ...] | str = "axes"
@@ -47,6 +49,7 @@ class Setting:
     gravity: bool = True
     held: int = 0
     pull: bool = False
+    targets: tuple[str, ...] = ()
 
 
 class AssemblyFamily(ProblemFamily):
@@ -75,6 +78,8 @@ class AssemblyFamily(ProblemFamily):
         fixed: Iterable[str] = (),
         ground: float | bool | None = None,
         before: Iterable[tuple[str, str]] = (),
+        keep: Iterable[str | Sequence[str]] = (),
+        target: Iterable[str] = (),
         units: str | None = None,
         name: str = "",
     ) -> Problem:
@@ -101,6 +106,11 @@ class AssemblyFamily(ProblemFamily):
                 point; False: none; None: under the lowest point (or where the assembly has its table) with gravity,
                 none without.
             before: pairs of names of parts: the first must leave before the second.
+            keep: groups of names of parts, or names of sub-assemblies, that are one part each, throughout: blocked by
+                others only, standing, leaving and counted as one (`neurosym.geometry.keeping`). What a BurrTools file
+                or an assembly's JSON calls a piece group is less: its parts move by themselves, and the task is done
+                once all that is still together is within one group.
+            target: names of the parts that are to be out, with as few others as can be; without any, all are.
             units: of the files' lengths, where the files do not say.
             name: of the problem; default the file's, or the sample's.
 
@@ -113,19 +123,26 @@ class AssemblyFamily(ProblemFamily):
         if pull and not (gravity and stability == "springs"):
             raise InputError('Expected pull=True under gravity with stability="springs", which alone knows what drags.')
         assembly = assembly.with_fixed(dict.fromkeys((*assembly.fixed, *as_names(fixed, "fixed"))))
+        kept = keep_together(assembly, keep)
+        assembly = kept.assembly
+        before = [(kept.name(a), kept.name(b)) for a, b in checked_pairs(before, "the domain 'assembly'")]
         assembly = assembly.with_table(_table(assembly, gravity, ground))
         if len(assembly.fixed) == len(assembly):
             raise InputError(f"Expected a part that is not fixed, to take out; all {len(assembly)} are. Fix fewer.")
         geometry = AssemblyGeometry(assembly, rule=stability, tilt=tilt)
         vectors = geometry.directions(directions)
         hands = int(held) if gravity else 0
-        setting = Setting(tuple(map(tuple, vectors.tolist())), paths, bool(groups), bool(gravity), hands, bool(pull))
+        targets = _targets(assembly, [kept.name(name) for name in as_names(target, "target")])
+        along = tuple(map(tuple, vectors.tolist()))
+        setting = Setting(along, paths, bool(groups), bool(gravity), hands, bool(pull), targets)
         details = {
             "directions": directions if isinstance(directions, str | int) else vectors.tolist(),
             "ground": assembly.ground if assembly.has_table else None,
             "fixed": list(assembly.fixed),
             "stability": stability,
             "tilt": geometry.tilt,
+            "keep": [list(group) for group in kept.groups],
+            "target": list(targets),
             **{key: getattr(setting, key) for key in ("paths", "groups", "gravity", "held", "pull")},
         }
         make = apart_in_groups if groups else apart_one_by_one
@@ -169,6 +186,15 @@ def _check_options(
         raise InputError(f"Expected held as a number of parts, 0 or more; got {held!r}.")
     if ground is not None and not (isinstance(ground, int | float | np.number) and np.isfinite(ground)):
         raise InputError(f"Expected ground as a height, True, False or None; got {ground!r}.")
+
+
+def _targets(assembly: Assembly, names: Iterable[str]) -> tuple[str, ...]:
+    for name in (chosen := tuple(dict.fromkeys(names))):
+        if name not in assembly.index:
+            raise UnknownNameError("target", name, assembly.names)
+        if name in assembly.fixed:
+            raise InputError(f"Expected targets that are not fixed, to take out; {name!r} is.")
+    return chosen
 
 
 def _table(assembly: Assembly, gravity: bool, ground: float | bool | None) -> float | None:

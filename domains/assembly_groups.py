@@ -25,11 +25,12 @@ from typing import TYPE_CHECKING, Any
 from domains.assembly_splits import Block, Splitter
 from domains.assembly_why import explain_groups
 from neurosym.errors import InputError
+from neurosym.geometry.grouping import need_not_part
 from neurosym.geometry.queries import AssemblyGeometry
 from neurosym.geometry.step_motion import StepMotion
 from neurosym.language import Action, Domain, Fluent, GroundProblem, Problem, Type
 from neurosym.language.explanation import WhyNot
-from neurosym.language.search_problem import Rejection, Step, Verdict
+from neurosym.language.search_problem import Rejection, RelaxedPlan, Step, Verdict
 from neurosym.language.semantics import Semantics, Validation
 from neurosym.support.bitsets import bits
 from neurosym.support.words import listed
@@ -77,6 +78,7 @@ def _lowest(geometry: AssemblyGeometry, setting: Setting, before: Sequence[tuple
     assembly = geometry.assembly
     named = {n for pair in before for n in pair}
     free = [n for n in assembly.names if n not in named]
+    free = [n for n in free if n not in setting.targets] or free
     if not free:
         raise InputError(
             "Expected a part, in groups without a fixed one, that `before` does not name: it stays as the anchor. "
@@ -98,8 +100,13 @@ class GroupSemantics(Semantics):
     def __init__(self, geometry: AssemblyGeometry, setting: Setting, anchors: int) -> None:
         self.geometry, self.setting, self.anchors = geometry, setting, anchors
         self.assembly = assembly = geometry.assembly
+        self.targets = assembly.mask(setting.targets)
         #: Whether one block stands: on a ground, around fixed parts, or under gravity.
         self.standing = setting.gravity or assembly.has_table or bool(assembly.fixed)
+
+    @property
+    def planner(self) -> str:
+        return "fewest" if self.targets else "backtracking"
 
     def search(self, problem: Problem) -> GroupSearch:
         return GroupSearch(self, problem.symbols)
@@ -137,7 +144,9 @@ class GroupSemantics(Semantics):
                 grounded = block - leaving
             anchors.add(name)
         together = [b for b in blocks if len(b - set(self.assembly.fixed)) + bool(b & set(self.assembly.fixed)) > 1]
-        if together:
+        if self.setting.targets:
+            together = [b for b in together if b & set(self.setting.targets)]
+        if together and (self.setting.targets or not need_not_part(together, self.assembly.piece_groups)):
             left = tuple(n for n in world.names if n in together[0])
             said = f"After all {len(order)} actions the goal is missed: {listed(left)} are still together."
             return Validation(False, len(order), left, said)
@@ -160,6 +169,7 @@ class GroupSemantics(Semantics):
         splitter = Splitter(self.geometry, relaxed)
         waiting = [(Block((1 << len(self.assembly)) - 1, self.standing), self.anchors)]
         done: list[str] = []
+        stuck: list[tuple[Block, dict[str, Rejection]]] = []
         while waiting:
             block, kept = waiting.pop()
             refused = {}
@@ -176,9 +186,18 @@ class GroupSemantics(Semantics):
                 refused[self.assembly.names[number]] = Rejection(verdict.reason, verdict.because, proved=verdict.proved)
             else:
                 if refused and all(r.proved for r in refused.values()):
-                    why = explain_groups(self.geometry, relaxed, tuple(done), [block], refused)
-                    return replace(why, relaxed=self.setting.gravity)
+                    stuck.append((block, refused))
+                    if not self.may_stay([b for b, _ in stuck]):
+                        blocks, rejections = [b for b, _ in stuck], {k: r for _, own in stuck for k, r in own.items()}
+                        why = explain_groups(self.geometry, relaxed, tuple(done), blocks, rejections)
+                        return replace(why, relaxed=self.setting.gravity)
         return None
+
+    def may_stay(self, blocks: Sequence[Block]) -> bool:
+        """Whether blocks need not come apart: there is no target in them, or each is within one piece group."""
+        if self.targets:
+            return not any(b.parts & self.targets for b in blocks)
+        return need_not_part([self.assembly.in_mask(b.parts) for b in blocks], self.assembly.piece_groups)
 
     def explain(self, problem: Problem, done: Sequence[str]) -> WhyNot | None:
         """Why the blocks that are left after the longest prefix do not come apart."""
@@ -197,6 +216,9 @@ class GroupSemantics(Semantics):
 class GroupSearch:
     """The `SearchProblem` over partitions."""
 
+    #: Of the splits that a name may stand for, the one with the smallest half is tried.
+    exhaustive = False
+
     def __init__(self, rules: GroupSemantics, symbols: GroundProblem) -> None:
         self.rules, self.symbols = rules, symbols
         self.assembly = rules.assembly
@@ -211,7 +233,18 @@ class GroupSearch:
         self._at_first: Verdict | None = None
 
     def is_goal(self, state: State) -> bool:
-        return self.symbols.is_goal(state[0])
+        early = self.rules.targets or self.assembly.piece_groups  # the goal may come before all are apart
+        return self.symbols.is_goal(state[0]) or (bool(early) and self.rules.may_stay(self.blocks(state)))
+
+    def relaxed_plan(self, state: State) -> RelaxedPlan | None:
+        """A block without k of its parts is k splits away, k - 1 where these are all."""
+        targets = self.rules.targets
+        if not targets:
+            return None
+        blocks = [b.parts for b in self.blocks(state) if b.parts & targets]
+        count = sum((b & targets).bit_count() - (not b & ~targets) for b in blocks)
+        wanted = [self._action_of[n] for b in blocks for n in bits(b & targets) if n in self._action_of]
+        return RelaxedPlan(count, tuple(wanted))
 
     def candidates(self, state: State) -> list[int]:
         return self.symbols.candidates(state[0])

@@ -8,13 +8,18 @@ from typing import TYPE_CHECKING, Any
 
 from domains.assembly_paths import NoWay, check_motion, way_out
 from domains.assembly_pull import drawn_out
+from domains.assembly_targets import Relaxation
 from domains.assembly_why import explain_removal, refute_removal
+from neurosym.geometry.assembly import Assembly
+from neurosym.geometry.grouping import need_not_part
 from neurosym.geometry.queries import AssemblyGeometry
 from neurosym.geometry.step_motion import StepMotion
 from neurosym.language import Action, Derived, Domain, Fluent, Problem, Simulation, State, Type, formulas, predicates
 from neurosym.language.explanation import WhyNot
-from neurosym.language.search_problem import Verdict
+from neurosym.language.grounding import BitState
+from neurosym.language.search_problem import RelaxedPlan, Verdict
 from neurosym.language.semantics import Semantics
+from neurosym.language.terms import Literal
 from neurosym.support.words import listed
 
 if TYPE_CHECKING:
@@ -47,20 +52,23 @@ def apart_one_by_one(
     details: Mapping[str, Any],
 ) -> Problem:
     """The problem in which an action, named by a part, removes that part."""
-    assembly = world.assembly
+    assembly, pairs = world.assembly, tuple(before)
     loose = [n for n in assembly.names if n not in assembly.fixed]
+    goal = [~present(n) for n in setting.targets or loose]
+    if assembly.piece_groups and not setting.targets:
+        goal = [Literal(need_not_separate(assembly)())]
     judged_alike = setting.gravity and not setting.held and not assembly.fixed and setting.paths == "straight"
     return removal_domain(setting).problem(
         world=world,
         objects={part: assembly.names},
         init=[*(present(n) for n in assembly.names), *(fixed(n) for n in assembly.fixed)],
-        goal=[~present(n) for n in loose],
-        before=before,
+        goal=goal,
+        before=pairs,
         name=name,
         family=family,
         simulation=Simulation("rigid", {n: n for n in loose}) if judged_alike else None,
         details=details,
-        semantics=RemovalSemantics(setting),
+        semantics=RemovalSemantics(setting, Relaxation(world, setting, assembly.mask(setting.targets), pairs)),
     )
 
 
@@ -69,6 +77,19 @@ class RemovalSemantics(Semantics):
     """Why an assembly does not come apart part by part."""
 
     setting: Setting
+    relaxation: Relaxation
+
+    @property
+    def planner(self) -> str:
+        return "fewest" if self.setting.targets else "backtracking"
+
+    def relaxed_plan(self, problem: Problem, state: int) -> RelaxedPlan | None:
+        if not self.setting.targets:
+            return None
+        ground, names = problem.symbols, self.relaxation.geometry.names
+        count, order = self.relaxation.smallest(BitState(ground, state).mask(present, names))
+        number = {name: action for action, name in enumerate(ground.actions)}
+        return RelaxedPlan(count, tuple(number[names[part]] for part in order))
 
     def refute(self, problem: Problem) -> WhyNot | None:
         assert problem.geometry is not None
@@ -99,6 +120,18 @@ def can_leave(setting: Setting) -> Derived:
         return check_motion(world, setting, motion, state.mask(present, world.names), standing=True)
 
     return Derived("free", [part], ask, check=check, formula=straight.formula if setting.paths == "straight" else None)
+
+
+def need_not_separate(assembly: Assembly) -> Derived:
+    """``need_not_separate()``: nothing but fixed parts is left, or all that is left is within one piece group."""
+
+    def ask(world: AssemblyGeometry, state: State) -> Verdict:
+        left = state.objects(present)
+        if set(left) <= set(assembly.fixed) or need_not_part([left], assembly.piece_groups):
+            return Verdict(True)
+        return Verdict(False, left, f"{listed(left)} are left, which are not within one piece group.")
+
+    return Derived("need_not_separate", [], ask)
 
 
 def stands_at_first(setting: Setting) -> Derived:

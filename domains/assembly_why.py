@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from domains.assembly_paths import NoWay, way_out
 from domains.assembly_pull import drawn_part
+from neurosym.geometry.grouping import need_not_part
 from neurosym.geometry.queries import AssemblyGeometry
 from neurosym.geometry.step_motion import StepMotion
 from neurosym.language.explanation import Blocked, Cycle, Fall, WhyNot, blockers_of, smallest_cycle
@@ -33,7 +34,9 @@ def refute_removal(geometry: AssemblyGeometry, setting: Setting) -> WhyNot | Non
         done += free
         there &= ~sum(1 << p for p in free)
     kept = there & ~geometry.assembly.fixed_mask
-    if not kept:
+    if setting.targets and not kept & geometry.mask(setting.targets):
+        return None
+    if not kept or (not setting.targets and need_not_part([geometry.in_mask(there)], geometry.assembly.piece_groups)):
         return None
     return WhyNot(
         after=tuple(geometry.names[p] for p in done),

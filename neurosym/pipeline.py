@@ -13,7 +13,8 @@ import numpy as np
 
 from neurosym.errors import ContractError, InputError
 from neurosym.language.problem import Problem
-from neurosym.language.search_problem import SearchProblem
+from neurosym.language.search_problem import RelaxedPlan, SearchProblem
+from neurosym.language.semantics import Semantics
 from neurosym.planning.budget import Budget
 from neurosym.planning.guard import guarded
 from neurosym.planning.order_scores import OrderScores
@@ -30,7 +31,7 @@ Advice = str | Path | Prior | OrderScores | None
 def solve(
     problem: Problem,
     *,
-    planner: str | Planner = "backtracking",
+    planner: str | Planner | None = None,
     prior: Advice = None,
     budget: Budget | None = None,
     rng: np.random.Generator | int | None = None,
@@ -40,7 +41,7 @@ def solve(
 
     Args:
         problem: made by a domain, for instance ``ns.load_domain("soma").problem(17)``.
-        planner: a name or a planner.
+        planner: a name or a planner; None: the one that suits the problem, most often backtracking.
         prior: a name, a weights file, a prior, its scores, or None.
         budget: when to stop.
         rng: a generator or a seed; the same seed gives the same answer.
@@ -53,6 +54,8 @@ def solve(
     Raises:
         ContractError: the planner's plan does not survive its replay.
     """
+    if planner is None:
+        planner = getattr(problem, "semantics", Semantics()).planner
     return plans(problem, k=None, planner=planner, prior=prior, budget=budget, rng=rng, oracle=oracle)[0]
 
 
@@ -99,6 +102,7 @@ def search_and_check(
         results = planner.plans(search, scores, k=k, budget=budget, rng=rng)
     else:
         results = [planner.plan(search, scores, budget=budget, rng=rng)]
+    results = [_bounded(search, result) for result in results]
     for result in results:
         if result.plan is not None and oracle == "geometry":
             confirm(planner, result.plan, validate(problem, result.plan, result.motions))
@@ -106,6 +110,14 @@ def search_and_check(
             with open_oracle(problem, oracle) as fresh:
                 confirm(planner, result.plan, replay(fresh, result.plan))
     return results
+
+
+def _bounded(search: SearchProblem[Any], result: PlanResult) -> PlanResult:
+    """The result with whether it has the fewest actions, where the problem has a bound on them."""
+    known: RelaxedPlan | None = search.relaxed_plan(search.initial) if hasattr(search, "relaxed_plan") else None
+    if result.plan is None or known is None:
+        return result
+    return replace(result, fewest=bool(result.fewest) or len(result.plan) <= known.at_least)
 
 
 def advice(problem: Problem, prior: Advice) -> OrderScores | None:

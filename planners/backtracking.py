@@ -29,7 +29,8 @@ class Backtracking(SearchPlanner):
     traits = PlannerTraits(complete=True)
 
     def search(self, context: SearchContext) -> PlanResult:
-        return _DepthFirst(context).run()
+        goal = DepthFirst(context).run()
+        return context.failed(Status.UNSOLVABLE) if goal is None else context.solved(goal)
 
 
 @dataclass(slots=True, eq=False)
@@ -38,18 +39,21 @@ class _Node(Node):
     values: NDArray[np.float64] | None = None  # what each next action costs in the end
 
 
-class _DepthFirst:
+class DepthFirst:
+    """The search itself, for planners that begin with it."""
+
     def __init__(self, context: SearchContext) -> None:
         self.context = context
         heuristic = None if context.scores is None else AssignmentHeuristic(context.scores, context.rng)
         self.heuristic = None if heuristic is None or heuristic.indifferent else heuristic
         self.rank = context.rng.permutation(len(context.classes))  # the last tie-breaker
 
-    def run(self) -> PlanResult:
+    def run(self) -> Node | None:
+        """Where the first plan ends, or None."""
         context, is_goal = self.context, self.context.problem.is_goal
         root = _Node(context.problem.initial)
         if is_goal(root.state):
-            return context.solved(root)
+            return root
         dead: set[tuple[Any, int]] = set()
         root.untried = context.expand(root.state, root.used)
         node: _Node | None = root
@@ -67,11 +71,11 @@ class _DepthFirst:
                 continue
             child = node.child(action, answer)
             if is_goal(child.state):
-                return context.solved(child)
+                return child
             if (child.state, child.used) not in dead:
                 child.untried = context.expand(child.state, child.used)
                 node = child
-        return context.failed(Status.UNSOLVABLE)
+        return None
 
     def _next_action(self, node: _Node) -> int | None:
         """What to attempt at this node, or None when nothing is left."""

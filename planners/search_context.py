@@ -95,10 +95,10 @@ class SearchContext:
         """Of a plan's length under the scores (nats); 0 without any."""
         return 0.0 if self.scores is None else self.scores.length_cost(steps)
 
-    def solved(self, node: Node) -> PlanResult:
-        """The result for the plan that led to `node`."""
+    def solved(self, node: Node, *, fewest: bool | None = None) -> PlanResult:
+        """The result for the plan that led to `node`; whether it has the fewest actions, as far as that is known."""
         motions, failed = [at.motion for at in node.path()], self.deviated or self.log.iterations > 0
-        return self.log.solved(node.prefix(), motions, scores=self.scores, first_guess_failed=failed)
+        return self.log.solved(node.prefix(), motions, scores=self.scores, first_guess_failed=failed, fewest=fewest)
 
     def failed(self, status: Status) -> PlanResult:
         """The result for a search without a plan."""

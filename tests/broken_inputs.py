@@ -892,6 +892,23 @@ def puzzle_with_few_placements(folder: Path) -> Path:
     return puzzle(folder, placed="0 0 0 0")
 
 
+@case("'S1.1' and 'S1.2' are the same solid in the same place")
+def puzzle_with_one_piece_twice(folder: Path) -> Path:
+    return puzzle(folder, placed="0 0 0 0 0 0 0 0")
+
+
+@case("BurrTools")
+def puzzle_with_a_group_that_is_no_number(folder: Path) -> Path:
+    text = gzip.decompress(puzzle(folder).read_bytes()).decode()
+    return write(folder / "a.xmpuzzle", text.replace('count="2"', 'count="2" group="red"'))
+
+
+@case("BurrTools")
+def puzzle_with_a_group_that_is_none(folder: Path) -> Path:
+    text = gzip.decompress(puzzle(folder).read_bytes()).decode()
+    return write(folder / "a.xmpuzzle", text.replace('count="2"/>', 'count="2"><group count="1"/></shape>'))
+
+
 # -- the library's JSON ---------------------------------------------------------------------------------------
 
 
@@ -903,6 +920,46 @@ def json_of_text(folder: Path) -> Path:
 @case("JSON")
 def json_deep(folder: Path) -> Path:
     return write(folder / "a.json", "[" * 200_000)
+
+
+@case("two parts or more")
+def json_that_keeps_one_part_together(folder: Path) -> Path:
+    return own(folder, keep=[["a"]])
+
+
+@case("'a' comes twice")
+def json_that_keeps_a_part_in_two_groups(folder: Path) -> Path:
+    return own(folder, keep=[["a", "b"], ["b", "a"]])
+
+
+@case("part or sub-assembly")
+def json_that_keeps_what_is_not_there(folder: Path) -> Path:
+    return own(folder, keep=[["a", "c"]])
+
+
+@case("keep[0] is 'a'")
+def json_that_keeps_no_groups(folder: Path) -> Path:
+    return own(folder, keep=["a", "b"])
+
+
+@case("part of a piece group")
+def json_with_a_piece_group_of_others(folder: Path) -> Path:
+    return own(folder, piece_groups=[["a", {"of": ["c"]}]])
+
+
+@case("piece_groups[0][1].most is 0")
+def json_with_none_of_a_piece_group(folder: Path) -> Path:
+    return own(folder, piece_groups=[["a", {"of": ["b"], "most": 0}]])
+
+
+@case("part of a sub-assembly")
+def json_with_a_sub_assembly_of_others(folder: Path) -> Path:
+    return own(folder, subassemblies={"c": ["a", "d"]})
+
+
+@case("subassemblies is []")
+def json_with_a_list_of_sub_assemblies(folder: Path) -> Path:
+    return own(folder, subassemblies=[])
 
 
 @case('"format" is None')

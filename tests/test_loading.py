@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import gzip
 import json
+import re
 import time
 import zipfile
 from collections.abc import Callable
@@ -20,8 +21,10 @@ from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 from step_files import step_boxes
+from typer.testing import CliRunner
 
 import neurosym as ns
+from neurosym.cli import app
 from neurosym.commands.common import FileOptions
 from neurosym.geometry.contact import collision
 from neurosym.geometry.contact.overlaps import overlaps
@@ -657,6 +660,38 @@ def test_no_advice_goes_beyond_what_the_option_takes(tmp_path: Path):
     for gap, advised in ((0.2, True), (0.9, False)):
         (note,) = ns.Assembly.from_meshes({"a": box(), "b": box(at=(0, 0, 1 + gap))}).notes
         assert ("--touch" in note.remedy) == advised
+
+
+@in_tmp_path
+@given(share=st.floats(0.08, 0.6), gap=st.booleans())
+def test_what_a_message_advises_is_taken_and_is_enough(share: float, gap: bool, tmp_path: Path):
+    apart = 1 + share if gap else 1 - share
+    folder = folder_of(tmp_path, a=box((2, 2, 1)), b=box((2, 2, 1), at=(0.5, 0, apart)))
+    runner = CliRunner()
+    found = runner.invoke(app, ["inspect", str(folder), "--units", "mm"])
+    advised = re.search(r"touch=([\d.e-]+)", str(found.exception) if found.exception else found.stdout)
+    assert (advised is not None) == (1.1 * share <= MAX_TOUCH)
+    if advised is not None:
+        again = runner.invoke(app, ["inspect", str(folder), "--units", "mm", "--touch", advised[1]])
+        assert (again.exit_code, again.exception) == (0, None)
+        assert not any(word in again.stdout for word in ("touches nothing", "touch="))
+
+
+def test_the_same_solid_twice_is_named_as_that_however_thin_its_walls_and_however_it_is_cut():
+    tube, cube = trimesh.creation.annulus(4.8, 5, 10), trimesh.creation.box((10, 10, 10))
+    hole = trimesh.creation.box((9.4, 9.4, 9.4))
+    hole.invert()
+    walls = trimesh.util.concatenate([cube, hole])
+    for one, other in ((tube, tube.copy()), (walls, walls.copy()), (cube, cube.subdivide()), (tube, tube.subdivide())):
+        with pytest.raises(FaultyPartsError, match="'a' and 'b' are the same solid in the same place") as caught:
+            ns.Assembly.from_meshes({"a": one, "b": other})
+        assert "--touch" not in str(caught.value)
+    # One within the bounds of the other is another one, and a mate of thin walls is a mate.
+    lower, upper = trimesh.creation.box((10, 10, 10)), trimesh.creation.box((10, 10, 10))
+    upper.apply_translation((0, 0, 9.7))
+    assert [n.kind for n in ns.Assembly.from_meshes({"a": lower, "b": upper}, units="m").notes] == ["mating"]
+    with pytest.raises(FaultyPartsError, match="overlap by"):
+        ns.Assembly.from_meshes({"a": cube, "b": trimesh.creation.icosphere(2, 5)})
 
 
 def test_progress_is_told_part_by_part(tmp_path: Path):

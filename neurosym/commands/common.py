@@ -195,10 +195,20 @@ class RemovalOptions:
         float | None, typer.Option(metavar="DEG", help="What stays must stand however tilted by so many degrees.")
     ] = None
     fixed: Annotated[list[str] | None, typer.Option(metavar="NAME", help="A part that stays. May be repeated.")] = None
+    keep: Annotated[
+        list[str] | None,
+        typer.Option(metavar="A,B", help="Parts, or a sub-assembly, that are one part throughout. May be repeated."),
+    ] = None
+
+    target: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME", help="Take out only what has to go before this part, and it. May be repeated."),
+    ] = None
 
     def given(self) -> dict[str, Any]:
         """Those that were given, as `problem` of the domain "assembly" takes them."""
-        return {name: value for name, value in vars(self).items() if value is not None and value != []}
+        options = vars(self) | {"keep": [[name.strip() for name in text.split(",")] for text in self.keep or []]}
+        return {name: value for name, value in options.items() if value is not None and value != []}
 
 
 def load_assembly(path: Path, files: FileOptions) -> Assembly:

@@ -10,6 +10,7 @@ import typer
 
 from neurosym.commands.common import AsJson, AssemblyPath, FileOptions, RemovalOptions, print_json, problem_at
 from neurosym.errors import InputError
+from neurosym.support.words import joined
 
 if TYPE_CHECKING:
     from neurosym.language.problem import Problem
@@ -140,12 +141,16 @@ def _show(problem: Problem, inspection: Inspection) -> None:
     counts = f"{len(inspection.parts)} parts, {len(inspection.contacts)} pairs in contact"
     print(f"{problem.name}: {counts}; lengths in {unit}")
     _lines([f"{p.name}: volume {p.volume:.4g}{', fixed' if p.fixed else ''}" for p in inspection.parts], "parts")
+    _lines([f"Kept together: {joined(own)}" for own in inspection.kept], "groups")
+    _lines([f"Need not be separated: {joined(own)}" for own in inspection.piece_groups], "groups")
+    _lines([f"Sub-assembly {name}: {joined(own)}" for name, own in inspection.subassemblies.items()], "sub-assemblies")
     print("Contacts:")
     _lines([f"{c.a} and {c.b}: area {c.area:.4g}" for c in inspection.contacts], "contacts")
     print("Free along a straight line:" if inspection.free else "No part is free along a straight line.")
     _lines([f"{name}: {', '.join(ways)}" for name, ways in inspection.free_along.items()], "parts")
     if inspection.why is None:
-        print("Nothing is interlocked: along straight lines all that is not fixed comes apart, gravity aside.")
+        what = "all that must" if inspection.piece_groups else "all that is not fixed"
+        print(f"Nothing is interlocked: along straight lines {what} comes apart, gravity aside.")
     else:
         print(f"Interlocked: {', '.join(inspection.interlocked)}.")
         _lines(list(inspection.why.sentences), "reasons")

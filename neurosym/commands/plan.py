@@ -49,7 +49,9 @@ def plan(
     ],
     *,
     number: Annotated[int | None, typer.Option("--problem", metavar="N", help="Number of the problem.")] = None,
-    planner: Annotated[str | None, typer.Option(metavar="P", help="Default backtracking; with --k best-first.")] = None,
+    planner: Annotated[
+        str | None, typer.Option(metavar="P", help="Default backtracking; --k: best-first; --target: fewest.")
+    ] = None,
     search: SearchOptions,
     pictures: PictureStyle = "clean",
     expansions: Annotated[int | None, typer.Option(help="Budget: states expanded.")] = None,
@@ -100,7 +102,7 @@ def plan(
         prior = NO_PRIOR if path is None else UNTRAINED
     budget = Budget(seconds=search.seconds, attempts=search.attempts, expansions=expansions)
     settings: dict[str, Any] = {
-        "planner": planner or ("backtracking" if k is None else "best-first"),
+        "planner": planner or (problem.semantics.planner if k is None else "best-first"),
         "prior": None if prior == NO_PRIOR else prior,
         "budget": budget,
         "oracle": search.oracle,
@@ -173,6 +175,9 @@ def _show(problem: Problem, results: Sequence[PlanResult], answer: dict[str, Any
     if best.plan is not None:
         _show_steps(best.plan, best)
     print(best.status.sentence)
+    if best.plan is not None and best.fewest is not None:
+        steps = f"{len(best.plan)} step{'' if len(best.plan) == 1 else 's'}"
+        print(f"{steps}; proved fewest." if best.fewest else f"{steps}; not proved fewest.")
     if best.plan is None:
         so_far = joined(best.best_prefix) or "nothing"
         print(f"The longest prefix that works: {so_far} ({len(best.best_prefix)} of {len(problem.actions)}).")
@@ -192,7 +197,10 @@ def _show(problem: Problem, results: Sequence[PlanResult], answer: dict[str, Any
 
 
 def _show_steps(steps: Sequence[str], result: PlanResult) -> None:
-    """The plan and the refusals in the order in which they came; those off the plan's path say after what."""
+    """The plan and the refusals in the order in which they came; those off the plan's path say after what.
+
+    Where few actions are wanted these are left out: most come after the plan, of the search for a shorter one.
+    """
     motions = [f"  {motion}" if motion else "" for motion in result.motions] or [""] * len(steps)
     printed = 0
 
@@ -204,6 +212,8 @@ def _show_steps(steps: Sequence[str], result: PlanResult) -> None:
     for refusal in result.blame:
         depth = len(refusal.after)
         on_path = tuple(steps[:depth]) == refusal.after
+        if result.fewest is not None and not on_path:
+            continue  # of the search for a shorter plan
         if on_path:
             printed = advance(depth)
         elsewhere = "" if on_path and depth == printed else f" (after {joined(refusal.after) or 'nothing'})"

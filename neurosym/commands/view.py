@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def view(
-    target: Annotated[
+    what: Annotated[
         str,
         typer.Argument(
             metavar="PATH|DOMAIN",
@@ -30,7 +30,9 @@ def view(
     number: Annotated[
         int | None, typer.Option("--problem", metavar="N", help="Number of the domain's problem; default 0.")
     ] = None,
-    planner: Annotated[str, typer.Option(metavar="P", help="Name of a planner.")] = "backtracking",
+    planner: Annotated[
+        str | None, typer.Option(metavar="P", help="Default backtracking; with --target fewest.")
+    ] = None,
     search: SearchOptions,
     files: FileOptions,
     removal: RemovalOptions,
@@ -58,7 +60,8 @@ def view(
     options |= removal.given() | family_options(search.option)
     prior = None if search.prior == "none" else search.prior
     limits = (search.seconds, search.attempts)
-    query = Query(target, number, options, planner, prior, search.oracle, search.seed, *limits)
+    planner = planner or ("fewest" if removal.target else "backtracking")
+    query = Query(what, number, options, planner, prior, search.oracle, search.seed, *limits)
     check_query(query)
     source = open_source(query, search.own_cells(), files.reading())
     if search.prior is None and source.saved is None:

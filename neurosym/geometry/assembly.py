@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 
 from neurosym.errors import AssemblyError, UnknownNameError
 from neurosym.geometry.bodies import Bodies
+from neurosym.geometry.grouping import PieceGroup
 from neurosym.geometry.notes import Note
 from neurosym.geometry.rigid_motions import are_rigid
 from neurosym.geometry.shapes import Part
@@ -44,6 +45,10 @@ class Assembly:
         fixed: names of parts that never move and need no support, such as springers and foundations.
         units: what a length of 1 is ("m", "mm", ...), for people and files; None when nobody said.
         notes: what a file's reader saw and mended.
+        keep: names of parts, or of one sub-assembly, that the domain "assembly" takes as one part each (see
+            `neurosym.geometry.keeping`).
+        piece_groups: parts that it need not separate from one another.
+        subassemblies: name -> names of its parts, for those that the file has.
     """
 
     parts: tuple[Part, ...]
@@ -53,6 +58,9 @@ class Assembly:
     fixed: tuple[str, ...] = ()
     units: str | None = None
     notes: tuple[Note, ...] = ()
+    keep: tuple[tuple[str, ...], ...] = ()
+    piece_groups: tuple[PieceGroup, ...] = ()
+    subassemblies: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         names = [p.name for p in self.parts]
@@ -64,6 +72,10 @@ class Assembly:
         if not (isinstance(self.friction, int | float | np.number) and 0.0 <= self.friction < np.inf):
             raise AssemblyError(f"Expected a coefficient of friction of 0 or more; got {self.friction!r}.")
         check_fixed(self.fixed, names)
+        grouped = {"piece group": [g.names for g in self.piece_groups], "sub-assembly": self.subassemblies.values()}
+        for what, groups in grouped.items():
+            if strange := [n for own in groups for n in own if n not in names]:
+                raise UnknownNameError(f"part of a {what}", strange[0], names)
 
     @classmethod
     def from_cells(

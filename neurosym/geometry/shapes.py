@@ -55,10 +55,11 @@ Shape = Box | Convex | Mesh
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """One shape of a part. ``X_PB``: float64 (4, 4), its pose in the part's frame."""
+    """One shape of a part. ``X_PB``: float64 (4, 4), its pose in the part's frame; ``density``: times the part's."""
 
     shape: Shape
     X_PB: Array
+    density: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,7 @@ from neurosym.errors import ContractError, DefinitionError, InputError, UnknownN
 from neurosym.geometry.step_motion import StepMotion
 from neurosym.language.actions import moved_parts
 from neurosym.language.instances import Instance, check_precedence, instantiate, reachable_instances
-from neurosym.language.search_problem import Rejection, Step, Verdict
+from neurosym.language.search_problem import Rejection, RelaxedPlan, Step, Verdict
 from neurosym.language.terms import Atom, Derived, Fluent, Literal
 
 if TYPE_CHECKING:
@@ -104,6 +104,10 @@ class GroundProblem:
     def apply(self, state: int, action: int) -> int:
         """The state after the effects of `action`, no question asked."""
         return (state & ~self._del[action]) | self._add[action]
+
+    def relaxed_plan(self, state: int) -> RelaxedPlan | None:
+        """See `RelaxedPlan`."""
+        return self.problem.semantics.relaxed_plan(self.problem, state)
 
     # -- for people and oracles -------------------------------------------------------------------------------
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
+from typing import TYPE_CHECKING, Generic, NamedTuple, Protocol, TypeVar
 
 if TYPE_CHECKING:
     from neurosym.geometry.step_motion import StepMotion
@@ -84,8 +84,23 @@ class Rejection:
     after: tuple[str, ...] = field(default=(), kw_only=True)
 
 
+class RelaxedPlan(NamedTuple):
+    """What a relaxation of a problem says of a state.
+
+    Attributes:
+        at_least: no plan from there has fewer actions: a bound, which must be sound.
+        actions: indices of the actions of a plan of the relaxation, in order ("helpful", Hoffmann and Nebel 2001).
+    """
+
+    at_least: int
+    actions: tuple[int, ...]
+
+
 class SearchProblem(Protocol[S]):
     """All that a planner may use.
+
+    Two more are looked for: ``relaxed_plan(state)``, a `RelaxedPlan` or None, and ``exhaustive``, False where an action
+    stands for several ways of which only one is tried, so that no search proves that a plan has the fewest actions.
 
     Attributes:
         actions: names of the N action primitives, in the order in which priors score them. Each can be

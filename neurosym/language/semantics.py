@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from neurosym.geometry.step_motion import StepMotion
     from neurosym.language.explanation import WhyNot
     from neurosym.language.problem import Problem
-    from neurosym.language.search_problem import SearchProblem
+    from neurosym.language.search_problem import RelaxedPlan, SearchProblem
 
 
 @dataclass(frozen=True)
@@ -41,12 +41,21 @@ class Validation:
 class Semantics:
     """What a problem means beyond its symbols. This one leaves all to the symbols; a family overrides what it knows."""
 
+    @property
+    def planner(self) -> str:
+        """Name of the planner that suits it, where the user names none."""
+        return "backtracking"
+
     def search(self, problem: Problem) -> SearchProblem[Any]:
         """What planners see: by default the ground symbols, which name the actions, precedence and goal in any case."""
         return problem.symbols
 
     def replay(self, problem: Problem, order: Sequence[str], motions: Sequence[StepMotion | None]) -> Validation | None:
         """See `validate`: shares no table with `search` and asks the world anew. None: by the symbols."""
+        return None
+
+    def relaxed_plan(self, problem: Problem, state: Any) -> RelaxedPlan | None:
+        """How many actions are needed from a state of the symbols on; for problems that want as few as can be."""
         return None
 
     def refute(self, problem: Problem) -> WhyNot | None:

@@ -35,5 +35,6 @@ def result_part(result: PlanResult) -> dict[str, Any]:
             for r in result.blame
         ],
         **{name: getattr(result, name) for name in ("iterations", "expansions", "attempts", "seconds", "cost")},
+        "fewest": result.fewest,
         "why_not": None if result.why_not is None else result.why_not.as_json(),
     }

@@ -57,6 +57,9 @@ class Inspection:
         margin: the largest tilt of gravity (degrees) that it bears; None where it was not asked for.
         held: names of the parts to hold so that it stands.
         notes: what was found while loading, in sentences.
+        kept: names of the parts that are one part throughout, group by group.
+        piece_groups: names of parts that need not be separated from one another.
+        subassemblies: name -> names of its parts, for those that the file has.
     """
 
     parts: tuple[PartFacts, ...]
@@ -72,6 +75,9 @@ class Inspection:
     margin: float | None
     held: tuple[str, ...]
     notes: tuple[str, ...]
+    kept: tuple[tuple[str, ...], ...]
+    piece_groups: tuple[tuple[str, ...], ...]
+    subassemblies: dict[str, tuple[str, ...]]
 
     def as_json(self) -> dict[str, Any]:
         """For a file."""
@@ -118,6 +124,9 @@ def inspect_problem(problem: Problem, *, margin: bool = False) -> Inspection:
         falls=() if stands else world.in_mask(standing.falling),
         held=world.in_mask(standing.held) if stands else (),
         notes=tuple(map(str, world.assembly.notes)),
+        kept=tuple(map(tuple, problem.details["keep"])),
+        piece_groups=tuple(group.names for group in world.assembly.piece_groups),
+        subassemblies=dict(world.assembly.subassemblies),
     )
 
 

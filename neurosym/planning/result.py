@@ -62,6 +62,7 @@ class PlanResult:
         cost: the plan's cost under the prior (nats), or None when there was no prior or no plan.
         first_guess_failed: whether the first complete order that was tried was refused somewhere;
             the paper's initial collapse. None when the search says nothing about it.
+        fewest: whether it is proved that no plan has fewer actions; None where nobody asked.
         why_not: why the search could not go on, for a problem that can explain it and has no plan; else None.
     """
 
@@ -77,6 +78,7 @@ class PlanResult:
     cost: float | None = None
     first_guess_failed: bool | None = None
     why_not: WhyNot | None = None
+    fewest: bool | None = None
 
     def __post_init__(self) -> None:
         if (self.plan is not None) != (self.status is Status.SOLVED):

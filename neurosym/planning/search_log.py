@@ -85,10 +85,12 @@ class SearchLog(Generic[S]):
         *,
         scores: OrderScores | None = None,
         first_guess_failed: bool | None = None,
+        fewest: bool | None = None,
     ) -> PlanResult:
         """The result for a plan, given as indices of actions."""
         named, cost = Plan(self.names(plan), motions), None if scores is None else scores.plan_cost(plan)
-        return self._result(Status.SOLVED, named, tuple(named), first_guess_failed, motions=named.motions, cost=cost)
+        rest = {"motions": named.motions, "cost": cost, "fewest": fewest}
+        return self._result(Status.SOLVED, named, tuple(named), first_guess_failed, **rest)
 
     def failed(self, status: Status, *, first_guess_failed: bool | None = None) -> PlanResult:
         """The result for a search that ended without a plan.

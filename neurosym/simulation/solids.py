@@ -8,7 +8,7 @@ along the principal axes, and the whole scene is scaled until a typical body mea
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -119,7 +119,11 @@ def rigid_bodies(
     made = []
     for part in assembly.parts:
         static = part.name in assembly.fixed and len(part.bodies) == 1  # a mesh joins no compound
-        solids = [s for body in part.bodies for s in _solids(part, body, scale, clearance, meshes, static)]
+        solids = [
+            replace(s, volume=s.volume * body.density, inertia=s.inertia * body.density)
+            for body in part.bodies
+            for s in _solids(part, body, scale, clearance, meshes, static)
+        ]
         groups: Sequence[Sequence[Solid]] = [solids] if kind == "parts" else [[solid] for solid in solids]
         made += [_join(part.name, i, group, part.density / heaviest) for i, group in enumerate(groups)]
     return tuple(made)

@@ -7,6 +7,8 @@
        {"name": "tee", "cells": [[0, 0, 0], [1, 0, 0]], "cell": 1.0, "pose": [[1, 0, 0, 0], ...]},
        {"name": "gear", "mesh": "gear.stl", "density": 7.8}]}
 
+Besides, `keep` lists groups of names, each one part throughout; `piece_groups` lists groups that need not be separated,
+of names or {"of": [names], "most": 1} where only so many of them are in it; `subassemblies` is {name: [names]}.
 Of a part only the name and one of `cells`, `boxes`, `mesh` and `bodies` are needed. `pose` is X_WP, 4 x 4. `mesh` is
 a path relative to the file, inside its folder. `bodies` is what `write` uses: shapes at poses, number by number.
 """
@@ -23,6 +25,7 @@ import numpy as np
 
 from neurosym.errors import AssemblyError
 from neurosym.geometry.assembly import Assembly
+from neurosym.geometry.grouping import PieceGroup
 from neurosym.geometry.readers.contents import Contents, RawMesh
 from neurosym.geometry.readers.limits import MAX_TEXT_BYTES, gunzip, inside, read_bytes, within_limits
 from neurosym.geometry.rigid_motions import are_rigid
@@ -36,8 +39,10 @@ FORMAT = "neurosym-assembly"
 #: Raise it when a reader of the old one would go wrong.
 SCHEMA = 1
 
-_TOP = {"format", "schema", "units", "friction", "table", "tolerances", "fixed", "parts"}
+_GROUPS = {"keep", "piece_groups", "subassemblies"}
+_TOP = {"format", "schema", "units", "friction", "table", "tolerances", "fixed", "parts", *_GROUPS}
 _PART = {"name", "density", "pose", "cells", "cell", "boxes", "mesh", "bodies"}
+_BODY = {"box", "convex", "mesh", "pose", "density"}
 
 
 def write(assembly: Assembly, path: str | Path) -> None:
@@ -56,11 +61,24 @@ def write(assembly: Assembly, path: str | Path) -> None:
                 "name": part.name,
                 "density": part.density,
                 "pose": part.X_WP.tolist(),
-                "bodies": [{**_shape(body.shape), "pose": body.X_PB.tolist()} for body in part.bodies],
+                "bodies": [
+                    {**_shape(body.shape), "pose": body.X_PB.tolist()}
+                    | ({} if body.density == 1.0 else {"density": body.density})
+                    for body in part.bodies
+                ],
             }
             for part in assembly.parts
         ],
     }
+    groups = {
+        "keep": assembly.keep,
+        "piece_groups": [
+            [own[0] if (len(own), most) == (1, 1) else {"of": own, "most": most} for own, most in group.members]
+            for group in assembly.piece_groups
+        ],
+        "subassemblies": assembly.subassemblies,
+    }
+    document |= {name: value for name, value in groups.items() if value}
     write_text(path, json.dumps(document, allow_nan=False, ensure_ascii=True) + "\n")
 
 
@@ -108,7 +126,32 @@ def _contents(given: Any, read_mesh: Callable[[str], RawMesh], path: Path) -> Co
         None if table is None else _number("table", table),
         None if friction is None else _number("friction", friction, low=0.0),
         None if tolerances is None else _tolerances(tolerances),
+        keep=tuple(_names(f"keep[{i}]", group) for i, group in enumerate(_list("keep", top.get("keep", [])))),
+        piece_groups=tuple(
+            _piece_group(f"piece_groups[{i}]", group)
+            for i, group in enumerate(_list("piece_groups", top.get("piece_groups", [])))
+        ),
+        subassemblies={
+            name: _names(f"subassemblies.{name}", own)
+            for name, own in _mapping("subassemblies", top.get("subassemblies", {})).items()
+        },
     )
+
+
+def _names(at: str, given: Any) -> tuple[str, ...]:
+    return tuple(_text(f"{at}[{i}]", name) for i, name in enumerate(_list(at, given)))
+
+
+def _piece_group(at: str, given: Any) -> PieceGroup:
+    members: list[tuple[tuple[str, ...], int]] = []
+    for i, some in enumerate(_list(at, given)):
+        if isinstance(some, str):
+            members.append(((some,), 1))
+            continue
+        member = _mapping(f"{at}[{i}]", some, {"of", "most"})
+        most = int(_number(f"{at}[{i}].most", member.get("most", 1), low=1.0))
+        members.append((_names(f"{at}[{i}].of", member.get("of")), most))
+    return PieceGroup(tuple(members))
 
 
 def _tolerances(given: Any) -> Tolerances:
@@ -160,20 +203,21 @@ def _box(at: str, given: Any) -> Body:
 
 
 def _body(at: str, given: Any) -> Body:
-    body = _mapping(at, given, {"box", "convex", "mesh", "pose"})
+    body = _mapping(at, given, _BODY)
+    density = _number(f"{at}.density", body.get("density", 1.0), above=0.0)
     X = _pose(f"{at}.pose", body["pose"]) if "pose" in body else np.eye(4)
     kinds = [k for k in ("box", "convex", "mesh") if k in body]
     if len(kinds) != 1:
         raise _Odd(f"{at} has {' and '.join(kinds) or 'no shape'}, expected one of box, convex and mesh")
     kind = kinds[0]
     if kind == "box":
-        return Body(Box(_size(f"{at}.box", body["box"])), X)
+        return Body(Box(_size(f"{at}.box", body["box"])), X, density)
     mesh = _mapping(f"{at}.{kind}", body[kind], {"vertices", "faces"})
     vertices = _array(f"{at}.{kind}.vertices", mesh.get("vertices"), (None, 3))
     faces = _array(f"{at}.{kind}.faces", mesh.get("faces"), (None, 3))
     if (faces != np.round(faces)).any() or faces.min() < 0 or faces.max() >= len(vertices):
         raise _Odd(f"{at}.{kind}.faces does not index its {len(vertices)} vertices")
-    return Body((Convex if kind == "convex" else Mesh)(vertices, faces.astype(np.int64)), X)
+    return Body((Convex if kind == "convex" else Mesh)(vertices, faces.astype(np.int64)), X, density)
 
 
 # -- values ---------------------------------------------------------------------------------------------------
@@ -196,12 +240,12 @@ def _brief(value: Any) -> str:
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
-def _mapping(at: str, value: Any, known: set[str]) -> Mapping[str, Any]:
+def _mapping(at: str, value: Any, known: set[str] | None = None) -> Mapping[str, Any]:
     if not isinstance(value, Mapping):
         raise _Odd(f"{at} is {_brief(value)}, expected an object")
-    odd = sorted(set(value) - known)
+    odd = [] if known is None else sorted(set(value) - known)
     if odd:
-        raise _Odd(f"{at} has {_brief(odd[0])}, expected only {', '.join(sorted(known))}")
+        raise _Odd(f"{at} has {_brief(odd[0])}, expected only {', '.join(sorted(known or ()))}")
     return value
 
 

@@ -1,5 +1,7 @@
 """BurrTools puzzles (``.xmpuzzle``): gzip'd XML; the pieces of one stored solution, on the cubic grid.
 
+A shape's ``group`` in a problem, or its children ``<group group= count=>``, say that so many of its pieces need not be
+separated from others of that group; all pieces of group 0, and those of none, are to be separated.
 A placement ``x y z t`` puts cell c of a shape at (x, y, z) + R[t] (c - h), h being the shape's hotspot.
 """
 
@@ -13,6 +15,7 @@ import numpy as np
 from defusedxml.ElementTree import fromstring
 
 from neurosym.errors import AssemblyError, InputError
+from neurosym.geometry.grouping import PieceGroup
 from neurosym.geometry.notes import Note
 from neurosym.geometry.readers.cells import parts_from_cells
 from neurosym.geometry.readers.contents import Contents
@@ -40,6 +43,10 @@ def rotations() -> Numbers:
     return matrices
 
 
+#: Number of a group -> numbers of pieces of one shape, and how many of them are in it.
+Groups = dict[int, list[tuple[range, int]]]
+
+
 @dataclass(frozen=True, eq=False)
 class _Shape:
     """``name``; ``cells``: int64 (n, 3), from the hotspot."""
@@ -61,7 +68,7 @@ def read_xmpuzzle(path: Path, *, problem: int = 1, solution: int = 1) -> Content
             raise AssemblyError(f"Expected the cubic grid in {path}; it has grid type {grid.get('type')}.")
         problems = root.findall("problems/problem")
         chosen = _chosen(problems, problem, "problem", path)
-        pieces = _pieces(chosen, [*root.findall("shapes/voxel")], path)
+        pieces, groups = _pieces(chosen, [*root.findall("shapes/voxel")], path)
         stored = [s for s in chosen.findall("solutions/solution") if s.find("assembly") is not None]
         if not stored:
             others = [str(n) for n, p in enumerate(problems, 1) if p.find("solutions/solution/assembly") is not None]
@@ -69,7 +76,7 @@ def read_xmpuzzle(path: Path, *, problem: int = 1, solution: int = 1) -> Content
             hint = hint if others else "Solve it in BurrTools, and save it again."
             raise AssemblyError(f"Expected problem {problem} of {path} to store a solution; it stores none. {hint}")
         words = (_chosen(stored, solution, "solution", path).findtext("assembly") or "").split()
-        return _placed(pieces, words, path)
+        return _placed(pieces, groups, words, path)
 
 
 def _chosen(among: list[Any], number: int, what: str, path: Path) -> Any:
@@ -78,16 +85,21 @@ def _chosen(among: list[Any], number: int, what: str, path: Path) -> Any:
     return among[number - 1]
 
 
-def _pieces(problem: Any, voxels: list[Any], path: Path) -> list[tuple[str, _Shape]]:
-    """The pieces in the order in which a solution places them, each with a name of its own."""
+def _pieces(problem: Any, voxels: list[Any], path: Path) -> tuple[list[tuple[str, _Shape]], Groups]:
+    """The pieces in the order in which a solution places them, and for each group which of them may be in it."""
     pieces: list[tuple[str, _Shape]] = []
+    groups: Groups = {}
     for entry in problem.findall("shapes/shape"):
         number = int(entry.attrib["id"])
         shape = _shape(voxels[number], number, path)
         count = int(entry.get("count", entry.get("max", "1")))
         within_limits(path, 0, parts=len(pieces) + count)
+        stated = [(int(g.attrib["group"]), int(g.get("count", count))) for g in entry.findall("group")]
+        for group, most in stated or [(int(entry.get("group", "0")), count)]:
+            if group and most > 0:
+                groups.setdefault(group, []).append((range(len(pieces), len(pieces) + count), most))
         pieces += [(shape.name if count == 1 else f"{shape.name}.{k + 1}", shape) for k in range(count)]
-    return pieces
+    return pieces, groups
 
 
 def _shape(voxel: Any, number: int, path: Path) -> _Shape:
@@ -104,7 +116,7 @@ def _shape(voxel: Any, number: int, path: Path) -> _Shape:
     return _Shape(name, cells.astype(np.int64), symbols.count("+"))
 
 
-def _placed(pieces: list[tuple[str, _Shape]], words: list[str], path: Path) -> Contents:
+def _placed(pieces: list[tuple[str, _Shape]], groups: Groups, words: list[str], path: Path) -> Contents:
     R = rotations()
     names, notes = distinct([name for name, _ in pieces])
     cells: dict[str, Numbers] = {}
@@ -126,4 +138,9 @@ def _placed(pieces: list[tuple[str, _Shape]], words: list[str], path: Path) -> C
     if sum(map(len, cells.values())) > MAX_CELLS:
         raise AssemblyError(f"Expected at most {MAX_CELLS:,} cells in {path}; got more.")
     parts = parts_from_cells({name: own.tolist() for name, own in cells.items()}, 1.0)
-    return Contents(parts, notes=tuple(notes))
+    placed = [
+        [(tuple(names[n] for n in numbers if names[n] in cells), most) for numbers, most in groups[group]]
+        for group in sorted(groups)
+    ]
+    members = (tuple((own, min(most, len(own))) for own, most in group if own) for group in placed)
+    return Contents(parts, notes=tuple(notes), piece_groups=tuple(PieceGroup(own) for own in members if own))

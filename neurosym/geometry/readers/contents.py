@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
+from neurosym.geometry.grouping import PieceGroup
 from neurosym.geometry.notes import Note
 from neurosym.geometry.shapes import Part
 from neurosym.geometry.tolerances import Tolerances
@@ -29,6 +30,7 @@ class RawMesh:
         rounding: of the coordinates, as a share of their size.
         X_WP: float64 (4, 4), the part's pose; None: the part's frame is the world.
         density: mass per unit of volume.
+        within: the sub-assemblies that it lies in, the outermost first: a number each, and its name.
     """
 
     name: str
@@ -37,6 +39,7 @@ class RawMesh:
     rounding: float = FLOAT64
     X_WP: Array | None = None
     density: float = 1.0
+    within: tuple[tuple[int, str], ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +51,7 @@ class Contents:
         units, fixed, table, friction, tolerances: as in `Assembly`; None where the file says nothing.
         notes: what was odd but harmless.
         separate: whether solids of one mesh are parts of their own.
+        keep, piece_groups, subassemblies: as in `Assembly`; sub-assemblies besides those that meshes lie in.
         hint: what to try where parts cannot be used; empty: what each fault says.
     """
 
@@ -60,6 +64,9 @@ class Contents:
     notes: tuple[Note, ...] = ()
     separate: bool = False
     hint: str = ""
+    keep: tuple[tuple[str, ...], ...] = ()
+    piece_groups: tuple[PieceGroup, ...] = ()
+    subassemblies: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
 
 def united(name: str, pieces: Sequence[tuple[Array, Numbers]], rounding: float = FLOAT64) -> RawMesh:
@@ -68,3 +75,12 @@ def united(name: str, pieces: Sequence[tuple[Array, Numbers]], rounding: float =
     vertices = np.concatenate([np.zeros((0, 3)), *(v for v, _ in pieces)])
     faces = np.concatenate([np.zeros((0, 3), dtype=np.int64), *(f + s for (_, f), s in zip(pieces, starts))])
     return RawMesh(name, vertices, faces, rounding)
+
+
+def subassemblies(parts: Sequence[RawMesh | Part]) -> list[tuple[str, list[int]]]:
+    """Names of the sub-assemblies that meshes lie in, each with the numbers of its parts: several, but not all."""
+    inside: dict[tuple[int, str], list[int]] = {}
+    for number, part in enumerate(parts):
+        for above in part.within if isinstance(part, RawMesh) else ():
+            inside.setdefault(above, []).append(number)
+    return [(name, own) for (_, name), own in inside.items() if name and 1 < len(own) < len(parts)]

@@ -50,7 +50,7 @@ def _scaled(part: RawMesh | Part, times: float) -> RawMesh | Part:
     if isinstance(part, RawMesh):
         X = None if part.X_WP is None else _farther(part.X_WP, times)
         return replace(part, vertices=part.vertices * times, X_WP=X, density=density)
-    bodies = tuple(Body(_larger(b.shape, times), _farther(b.X_PB, times)) for b in part.bodies)
+    bodies = tuple(Body(_larger(b.shape, times), _farther(b.X_PB, times), b.density) for b in part.bodies)
     return Part(part.name, bodies, _farther(part.X_WP, times), density)
 
 

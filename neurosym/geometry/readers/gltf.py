@@ -100,15 +100,16 @@ class Scene:
             roots = [i for i in range(len(nodes)) if i not in children]
         parts: list[RawMesh] = []
         total, seen = 0, set()
-        stack = [(i, root) for i in reversed(roots)]
+        stack: list[tuple[int, Array, tuple[tuple[int, str], ...]]] = [(i, root, ()) for i in reversed(roots)]
         while stack:
-            i, X = stack.pop()
+            i, X, within = stack.pop()
             if i in seen or not 0 <= i < len(nodes):
                 raise AssemblyError(f"Expected a tree of nodes in {self.path}; node {i} is missing, or is met twice.")
             seen.add(i)
             node = nodes[i]
             X = X @ _motion(node)
-            stack += [(child, X) for child in reversed(node.get("children", []))]
+            below = (*within, (i, str(node.get("name") or "")))
+            stack += [(child, X, below) for child in reversed(node.get("children", []))]
             if "mesh" not in node:
                 continue
             pieces = self._mesh(node["mesh"])
@@ -121,7 +122,8 @@ class Scene:
                 place = X @ Y
                 # A mirrored copy has its faces inside out.
                 faces = mesh.faces if np.linalg.det(place[:3, :3]) > 0 else mesh.faces[:, ::-1]
-                parts.append(RawMesh(mesh.name, mesh.vertices @ place[:3, :3].T + place[:3, 3], faces, FLOAT32))
+                vertices = mesh.vertices @ place[:3, :3].T + place[:3, 3]
+                parts.append(RawMesh(mesh.name, vertices, faces, FLOAT32, within=within))
         return parts
 
     def _instances(self, node: Mapping[str, Any]) -> Iterable[Array]:

@@ -17,11 +17,12 @@ from neurosym.errors import AssemblyError, InputError
 from neurosym.geometry.assembly import FRICTION, Assembly, check_fixed
 from neurosym.geometry.bodies import Bodies
 from neurosym.geometry.contact.surfaces import BodySurfaces
+from neurosym.geometry.keeping import keep_together
 from neurosym.geometry.mesh import triangles
 from neurosym.geometry.notes import FaultyPartsError, Note
 from neurosym.geometry.readers.assembly_json import read_json
 from neurosym.geometry.readers.burrtools import read_xmpuzzle
-from neurosym.geometry.readers.contents import Contents, RawMesh
+from neurosym.geometry.readers.contents import Contents, RawMesh, subassemblies
 from neurosym.geometry.readers.conversion import in_units, upright
 from neurosym.geometry.readers.folder import MESHES, read_folder, read_mesh
 from neurosym.geometry.readers.gltf import read_gltf
@@ -122,7 +123,9 @@ def load(
     if contents.separate:
         contents = separate(contents)
         within_limits(source, 0, parts=len(contents.parts))
+    nested = subassemblies(contents.parts)
     names, renamed = distinct([part.name for part in contents.parts])
+    called = distinct([*names, *(name for name, _ in nested)], "sub-assembly")[0][len(names) :]
     contents = replace(
         contents,
         parts=tuple(replace(part, name=name) for part, name in zip(contents.parts, names)),
@@ -130,6 +133,10 @@ def load(
         tolerances=tolerances or contents.tolerances,
         friction=contents.friction if friction is None else friction,
         notes=(*notes, *contents.notes, *renamed),
+        subassemblies={
+            **contents.subassemblies,
+            **{name: tuple(names[n] for n in numbers) for name, (_, numbers) in zip(called, nested)},
+        },
     )
     return _checked(contents, str(source), progress)
 
@@ -171,7 +178,10 @@ def _checked(contents: Contents, source: str, progress: Progress) -> Assembly:
     progress(total, total)
     friction = FRICTION if contents.friction is None else contents.friction
     notes = (*contents.notes, *mended, *mating, *loose)
-    return Assembly(parts, contents.table, friction, mated, held, contents.units, notes)
+    groups = (contents.keep, contents.piece_groups, contents.subassemblies)
+    made = Assembly(parts, contents.table, friction, mated, held, contents.units, notes, *groups)
+    keep_together(made)  # refuses groups that are none
+    return made
 
 
 def _read(source: Path, options: Options) -> Contents:

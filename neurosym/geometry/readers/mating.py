@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from neurosym.geometry.bodies import Bodies
 from neurosym.geometry.contact.overlaps import overlaps
 from neurosym.geometry.contact.surfaces import BodySurfaces
 from neurosym.geometry.mesh.broad_phase import overlapping_pairs
+from neurosym.geometry.mesh.triangles import distances
 from neurosym.geometry.notes import Note
 from neurosym.geometry.tolerances import DEFAULT_TOLERANCES, Tolerances
 
@@ -38,8 +38,11 @@ def mating_tolerances(
     for overlap in overlaps(surfaces, fixed):
         pair = int(bodies.owners[overlap.a]), int(bodies.owners[overlap.b])
         deepest[pair] = max(deepest.get(pair, 0.0), overlap.depth)
-    slight = {pair: depth for pair, depth in deepest.items() if depth <= limit * smallest}
-    faults = [_too_deep(bodies, *pair, depth, limit) for pair, depth in deepest.items() if pair not in slight]
+    # Thin walls overlap by no more than they are thick, so the same one twice may look like a mate.
+    same = {pair for pair in deepest if _are_same(surfaces, *pair)}
+    slight = {pair: depth for pair, depth in deepest.items() if depth <= limit * smallest and pair not in same}
+    deep = {pair: depth for pair, depth in deepest.items() if pair not in slight}
+    faults = [_too_deep(bodies, *pair, depth, limit, same=pair in same) for pair, depth in deep.items()]
     share = max(slight.values(), default=0.0) / smallest
     if stated or share <= tolerances.touch:
         return tolerances, [], faults
@@ -53,12 +56,24 @@ def mating_tolerances(
     return replace(tolerances, touch=touch, play=touch), [Note(a, "mating", depth, sentence, other=b)], faults
 
 
-def _too_deep(bodies: Bodies, i: int, j: int, depth: float, limit: float) -> Note:
+def _are_same(surfaces: BodySurfaces, i: int, j: int) -> bool:
+    """Whether two parts are one solid in one place, cut into whichever facets: each has its corners on the other."""
+    bodies = surfaces.bodies
+    touch = DEFAULT_TOLERANCES.touch * bodies.smallest_extent
+    if np.abs(bodies.part_bounds[i] - bodies.part_bounds[j]).max() > touch:
+        return False
+    points, triangles = [], []
+    for part in (i, j):
+        points.append(bodies.points(1 << part))
+        exact = surfaces.exact
+        triangles.append(exact.triangles[bodies.owners[exact.body] == part])
+    return all(distances(points[k], triangles[1 - k]).max() <= touch for k in (0, 1))
+
+
+def _too_deep(bodies: Bodies, i: int, j: int, depth: float, limit: float, *, same: bool) -> Note:
     a, b = (bodies.parts[k].name for k in (i, j))
     share = depth / bodies.smallest_extent
-    corners = [np.concatenate([bodies.vertices(int(k)) for k in np.flatnonzero(bodies.owners == n)]) for n in (i, j)]
-    apart = max(cKDTree(u).query(v)[0].max() for u, v in (corners, corners[::-1]))
-    if apart <= DEFAULT_TOLERANCES.touch * bodies.smallest_extent:
+    if same:
         sentence = f"Parts {a!r} and {b!r} are the same solid in the same place."
         return Note(a, "overlap", depth, sentence, "Take one of them away.", b)
     sentence = f"Parts {a!r} and {b!r} overlap by {depth:.4g}, {share:.2g} of the smallest extent of any part; "
@@ -96,8 +111,9 @@ def floating(surfaces: BodySurfaces, fixed: int, ground: float, touch: float) ->
                 if gap < least:
                     least, nearest = gap, bodies.parts[owners[j]].name
         above = float(bodies.part_bounds[part, 0, 2] - ground)
-        sentence = f"Part {name!r} touches nothing: it is {above:.4g} above the ground"
-        sentence += f", and {least:.4g} from {nearest!r}, the nearest part." if nearest else "."
+        near = [f"{above:.4g} above the ground"] if np.isfinite(above) else []
+        near += [f"{least:.4g} from {nearest!r}, the nearest part"] if nearest else []
+        sentence = f"Part {name!r} touches nothing{': it is ' if near else ''}{', and '.join(near)}."
         share = 1.1 * min(above, least) / bodies.smallest_extent
         remedy = "Move it, or fix it."
         if share <= MAX_TOUCH:

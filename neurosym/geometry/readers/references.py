@@ -81,6 +81,8 @@ def referenced(given: Any, beside: Path) -> Assembly:
 def digest(assembly: Assembly) -> str:
     """A fingerprint of names, shapes, poses and fixed parts."""
     hashed = hashlib.sha256(repr((assembly.names, sorted(assembly.fixed), assembly.friction)).encode())
+    if assembly.keep or assembly.piece_groups:
+        hashed.update(repr((assembly.keep, assembly.piece_groups)).encode())
     for body, X, owner in zip(assembly.bodies, assembly.X_WB, assembly.owners):
         hashed.update(int(owner).to_bytes(4, "little"))
         for array in (X, body.shape.vertices, body.shape.faces):

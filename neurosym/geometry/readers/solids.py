@@ -33,13 +33,20 @@ def _is_closed(mesh: RawMesh) -> bool:
 
 def separate(contents: Contents) -> Contents:
     """The contents with each solid of each mesh a part of its own."""
-    apart = [separated(part) if isinstance(part, RawMesh) else [part] for part in contents.parts]
+    apart = [_within(part) if isinstance(part, RawMesh) else [part] for part in contents.parts]
     notes = [
         Note("", "solids", n, f"{mesh.name!r} is {n} solids: the parts '{mesh.name}-1' to '{mesh.name}-{n}'.")
         for mesh, own in zip(contents.parts, apart)
         if (n := len(own)) > 1
     ]
     return replace(contents, parts=tuple(part for own in apart for part in own), notes=(*contents.notes, *notes))
+
+
+def _within(mesh: RawMesh) -> list[RawMesh]:
+    """The solids of a mesh, which then is a sub-assembly, with what else it says."""
+    solids = separated(mesh)
+    within = (*mesh.within, (id(mesh), mesh.name)) if len(solids) > 1 else mesh.within
+    return [replace(solid, within=within) for solid in solids]
 
 
 def separated(mesh: RawMesh) -> list[RawMesh]:

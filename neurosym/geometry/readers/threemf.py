@@ -57,18 +57,21 @@ def read_3mf(path: Path) -> Contents:
         parts: list[RawMesh] = []
         left: list[str] = []
         total = 0
-        # (model, object, transform, name, depth), the last on top.
-        stack = [(m or main, i, X, name, 0) for m, i, X, name in reversed(root.items)]
+        # (model, object, transform, name, what it is a component of), the last on top.
+        above: tuple[tuple[int, str], ...] = ()
+        stack = [(m or main, i, X, name, above) for m, i, X, name in reversed(root.items)]
+        taken = 0
         while stack:
-            model, number, X, name, depth = stack.pop()
+            model, number, X, name, above = stack.pop()
             thing = _model(archive, model, models, path).objects[number]
-            if depth > MAX_DEPTH:
+            if len(above) > MAX_DEPTH:
                 raise AssemblyError(f"Expected objects at most {MAX_DEPTH} deep in {path}; they go on, or in a circle.")
             name = thing.name or name
             if thing.kind not in _PARTS:
                 left.append(f"{name or number!r} ({thing.kind})")
                 continue
-            stack += [(m or model, i, X @ Y, name, depth + 1) for m, i, Y in reversed(thing.components)]
+            below = (*above, (taken := taken + 1, name))
+            stack += [(m or model, i, X @ Y, name, below) for m, i, Y in reversed(thing.components)]
             within_limits(path, len(thing.faces), total, len(parts) + len(stack))
             if thing.components:
                 continue
@@ -76,7 +79,7 @@ def read_3mf(path: Path) -> Contents:
             vertices = np.array(thing.vertices, dtype=np.float64).reshape(-1, 3) @ X[:3, :3].T + X[:3, 3]
             faces = np.array(thing.faces, dtype=np.int64).reshape(-1, 3)
             faces = faces if np.linalg.det(X[:3, :3]) > 0 else faces[:, ::-1]
-            parts.append(RawMesh(name or f"object-{number}", vertices, faces))
+            parts.append(RawMesh(name or f"object-{number}", vertices, faces, within=above))
         sentence = f"{path.name}: {len(left)} objects that are no parts were left out: {', '.join(left[:5])}."
         return Contents(tuple(parts), root.unit, notes=(Note("", "skipped", len(left), sentence),) if left else ())
 

@@ -57,17 +57,17 @@ def merged_patches(assembly: Assembly, contacts: tuple[Contact, ...]) -> tuple[C
 
 def masses(assembly: Assembly) -> tuple[Array, Array]:
     """Masses (n,) and centres of mass (n, 3), in the world, of the parts."""
-    volumes, moments = np.zeros(len(assembly)), np.zeros((len(assembly), 3))
+    found, moments = np.zeros(len(assembly)), np.zeros((len(assembly), 3))
     for i, body in enumerate(assembly.bodies):
         owner = assembly.owners[i]
         if isinstance(body.shape, Box):
             volume, centre = float(np.prod(body.shape.size)), assembly.X_WB[i][:3, 3]
         else:
             volume, centre = volume_and_centre(assembly.bodies.vertices(i), body.shape.faces)
-        volumes[owner] += volume
-        moments[owner] += volume * centre
-    densities = np.array([p.density for p in assembly.parts])
-    return volumes * densities, moments / volumes[:, None]
+        mass = volume * body.density * assembly.parts[owner].density
+        found[owner] += mass
+        moments[owner] += mass * centre
+    return found, moments / found[:, None]
 
 
 def neighbours(patches: Iterable[Contact], n: int) -> tuple[list[int], list[int], int]:
