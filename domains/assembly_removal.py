@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from domains.assembly_paths import NoWay, check_motion, way_out
 from domains.assembly_pull import drawn_out
-from domains.assembly_why import explain_removal, refute_removal
+from domains.assembly_why import explain_building, explain_removal, refute_removal
 from neurosym.geometry.queries import AssemblyGeometry
 from neurosym.geometry.step_motion import StepMotion
 from neurosym.language import Action, Derived, Domain, Fluent, Problem, Simulation, State, Type, formulas, predicates
@@ -70,6 +70,10 @@ class RemovalSemantics(Semantics):
 
     setting: Setting
 
+    def side(self, problem: Problem) -> str:
+        """What cannot be taken apart cannot be built either, and where little is there that is often seen sooner."""
+        return "both"
+
     def refute(self, problem: Problem) -> WhyNot | None:
         assert problem.geometry is not None
         return refute_removal(problem.geometry, self.setting)
@@ -77,6 +81,10 @@ class RemovalSemantics(Semantics):
     def explain(self, problem: Problem, done: Sequence[str]) -> WhyNot | None:
         assert problem.geometry is not None
         return explain_removal(problem.geometry, self.setting, problem.before, tuple(done))
+
+    def explain_from_goal(self, problem: Problem, undone: Sequence[str]) -> WhyNot | None:
+        assert problem.geometry is not None
+        return explain_building(problem.geometry, self.setting, problem.before, tuple(undone))
 
 
 def can_leave(setting: Setting) -> Derived:
