@@ -18,7 +18,6 @@ from neurosym.cli import app
 from neurosym.language.reversal import reversed_problem
 from neurosym.language.search_problem import Rejection
 from neurosym.planning.result import Status
-from neurosym.testing.burrs import burr
 
 DATA = Path(__file__).parents[2] / "shared" / "data"
 ASSEMBLY = ns.load_domain("assembly")
@@ -62,7 +61,8 @@ def test_the_sides_agree_on_random_assemblies(block):
         for planner in (FORWARDS, BEST_FIRST):
             by_side = {s: planner.plan_from(problem.ground(), scores, side=s) for s in ("full", "empty", "both")}
             assert len({r.status for r in by_side.values()}) == 1, case
-            assert by_side["empty"].side == "empty" and by_side["full"].best_suffix is None
+            assert by_side["empty"].side == "empty"
+            assert by_side["full"].best_suffix is None
             for result in by_side.values():
                 if result.plan is not None:
                     assert ns.validate(problem, result.plan, result.motions), case
@@ -127,7 +127,8 @@ def test_components_stand_or_fall_by_themselves():
     assert stability.standing(mask(["foot", "on"])).stands, "each was judged by itself, and is remembered"
     assert sum(stability.asked.values()) == asked
     fallen = stability.standing(mask(list(cells)))
-    assert not fallen.stands and fallen.moving == mask(["off"])
+    assert not fallen.stands
+    assert fallen.moving == mask(["off"])
 
 
 def leaning(towers: int, **options) -> ns.Problem:
@@ -146,7 +147,8 @@ def test_it_is_told_how_far_the_empty_side_gets(side):
     assert result.status is Status.UNSOLVABLE
     if side == "empty":
         assert sorted(result.best_suffix) == [n for n in sorted(problem.actions) if n.startswith("t")]
-        assert result.why_not.left == ("left", "right") and result.why_not.building == ()
+        assert result.why_not.left == ("left", "right")
+        assert result.why_not.building == ()
         assert result.why_not.sentences[0].startswith("From the table alone only 6 of 8 parts")
         assert {f.without[0] for f in result.why_not.falls} == {"left", "right"}
 
@@ -166,7 +168,8 @@ def test_sides_that_cannot_be_are_refused_and_both_does_without():
 
 def test_held_parts_are_held_in_plans_from_the_goal():
     result = ns.solve(leaning(1, held=1), side="empty")
-    assert result.solved and any(motion.held for motion in result.motions)
+    assert result.solved
+    assert any(motion.held for motion in result.motions)
 
 
 def test_the_command_says_which_side_decided(tmp_path):
@@ -174,7 +177,8 @@ def test_the_command_says_which_side_decided(tmp_path):
     command = ["plan", "assembly", "--problem", "0", "--side", "empty", "--out", str(file)]
     assert CliRunner().invoke(app, command).exit_code == 0
     answer = json.loads(file.read_text())
-    assert answer["side"] == "empty" and answer["best_suffix"] == answer["plan"]
+    assert answer["side"] == "empty"
+    assert answer["best_suffix"] == answer["plan"]
     assert all(refusal["side"] == "empty" for refusal in answer["refusals"])
 
 
