@@ -1,9 +1,9 @@
 """From the full side, the empty side or both: how each search ends on real structures under gravity, and in what time.
 
 Structures from ../shared/data, backtracking with the prior `outermost-first`, each search on geometry of its own in a
-process of its own, CPU seconds of one thread, loading left out. Arguments: seconds a search may take (60, by the clock),
-then names of structures, each with how many parts may be held (crossvault:1); default arch, wall, dome and crossvault with
-none, and the vault with one and two.
+process of its own, CPU seconds of one thread, loading left out. Arguments: seconds a search may take (60, by the
+clock), then names of structures, each with how many parts may be held (crossvault:1); default arch, wall, dome and
+crossvault with none, and the vault with one and two.
 """
 
 from __future__ import annotations
