@@ -120,7 +120,7 @@ def test_orders_are_as_many_as_permutations_say(seed):
 
 def test_components_stand_or_fall_by_themselves():
     cells = {"foot": [(0, 0, 0)], "on": [(0, 0, 1)], "far": [(5, 0, 0)], "off": [(5, 0, 1), (6, 0, 1), (7, 0, 1)]}
-    stability = ASSEMBLY.problem(ns.Assembly.from_cells(cells)).geometry.stability
+    stability = ASSEMBLY.problem(ns.Assembly.from_cells(cells)).geometry.limit
     mask = stability.assembly.mask
     assert stability.standing(mask(["foot", "on", "far"])).stands
     asked = sum(stability.asked.values())
