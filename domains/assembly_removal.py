@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING, Any
 from domains.assembly_paths import NoWay, check_motion, way_out
 from domains.assembly_pull import drawn_out
 from domains.assembly_targets import Relaxation
-from domains.assembly_why import explain_removal, refute_removal
+from domains.assembly_why import explain_building, explain_removal, refute_removal
 from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.grouping import need_not_part
 from neurosym.geometry.queries import AssemblyGeometry
 from neurosym.geometry.step_motion import StepMotion
 from neurosym.language import Action, Derived, Domain, Fluent, Problem, Simulation, State, Type, formulas, predicates
 from neurosym.language.explanation import WhyNot
-from neurosym.language.grounding import BitState
 from neurosym.language.search_problem import RelaxedPlan, Verdict
 from neurosym.language.semantics import Semantics
+from neurosym.language.state import BitState
 from neurosym.language.terms import Literal
 from neurosym.support.words import listed
 
@@ -91,6 +91,10 @@ class RemovalSemantics(Semantics):
         number = {name: action for action, name in enumerate(ground.actions)}
         return RelaxedPlan(count, tuple(number[names[part]] for part in order))
 
+    def side(self, problem: Problem) -> str:
+        """What cannot be taken apart cannot be built either, and where little is there that is often seen sooner."""
+        return "both"
+
     def refute(self, problem: Problem) -> WhyNot | None:
         assert problem.geometry is not None
         return refute_removal(problem.geometry, self.setting)
@@ -98,6 +102,10 @@ class RemovalSemantics(Semantics):
     def explain(self, problem: Problem, done: Sequence[str]) -> WhyNot | None:
         assert problem.geometry is not None
         return explain_removal(problem.geometry, self.setting, problem.before, tuple(done))
+
+    def explain_from_goal(self, problem: Problem, undone: Sequence[str]) -> WhyNot | None:
+        assert problem.geometry is not None
+        return explain_building(problem.geometry, self.setting, problem.before, tuple(undone))
 
 
 def can_leave(setting: Setting) -> Derived:

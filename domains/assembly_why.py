@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
@@ -89,6 +90,34 @@ def explain_removal(
         falls=tuple(falls),
         waiting=tuple(waiting),
         unproved=tuple(unproved),
+    )
+
+
+def explain_building(
+    geometry: AssemblyGeometry, setting: Setting, before: Sequence[tuple[str, str]], placed: tuple[str, ...]
+) -> WhyNot:
+    """Why nothing more can be put in place beside what never leaves and `placed`, in the order of the plan's end."""
+    there = geometry.assembly.fixed_mask | geometry.mask(placed)
+    missing = (1 << len(geometry)) - 1 & ~there
+    graph, stability = geometry.blocking(setting.directions), geometry.stability
+    blocked: list[Blocked] = []
+    falls: list[Fall] = []
+    near = functools.reduce(int.__or__, (stability.touching[p] for p in bits(there)), stability.on_table) & missing
+    for part in bits(near if setting.gravity else missing):
+        if not graph.free_directions(part, there | 1 << part):
+            blocked += blockers_of(graph, part, there, table=True)
+        elif setting.gravity:
+            answer = stability.standing_when_held(there | 1 << part, setting.held)
+            if not answer.stands:
+                falls.append(Fall((geometry.names[part],), geometry.in_mask(answer.moving), (), setting.held))
+    absent = {geometry.names[p] for p in bits(missing)}
+    return WhyNot(
+        after=placed,
+        left=geometry.in_mask(missing),
+        blocked=tuple(blocked),
+        falls=tuple(falls),
+        waiting=tuple((a, b) for a, b in before if a in absent and b in absent),
+        building=geometry.assembly.fixed,
     )
 
 

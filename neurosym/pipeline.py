@@ -16,9 +16,9 @@ from neurosym.language.problem import Problem
 from neurosym.language.search_problem import RelaxedPlan, SearchProblem
 from neurosym.language.semantics import Semantics
 from neurosym.planning.budget import Budget
-from neurosym.planning.guard import guarded
+from neurosym.planning.guard import guarded, side_of
 from neurosym.planning.order_scores import OrderScores
-from neurosym.planning.planner import KBestPlanner, OrderCounter, Planner
+from neurosym.planning.planner import KBestPlanner, OrderCounter, Planner, TwoSidedPlanner
 from neurosym.planning.prior import Prior
 from neurosym.planning.result import OrderCount, PlanResult, Status
 from neurosym.planning.validation import confirm, replay, validate
@@ -36,6 +36,7 @@ def solve(
     budget: Budget | None = None,
     rng: np.random.Generator | int | None = None,
     oracle: str = "geometry",
+    side: str | None = None,
 ) -> PlanResult:
     """Plan: ground the symbols, read the prior, search, and replay what came out.
 
@@ -46,6 +47,8 @@ def solve(
         budget: when to stop.
         rng: a generator or a seed; the same seed gives the same answer.
         oracle: what answers attempts: ``"geometry"``, or ``"physics"``, a simulation in the loop.
+        side: from where to search: ``"full"``, the initial state; ``"empty"``, the goal; or ``"both"`` in turn, where
+            the problem and the planner can. Default both for assemblies taken apart part by part, full for others.
 
     Returns:
         The result; no plan is a result, never an exception. Every plan was replayed: by `validate`, or for
@@ -56,7 +59,8 @@ def solve(
     """
     if planner is None:
         planner = getattr(problem, "semantics", Semantics()).planner
-    return plans(problem, k=None, planner=planner, prior=prior, budget=budget, rng=rng, oracle=oracle)[0]
+    options: dict[str, Any] = {"planner": planner, "prior": prior, "budget": budget, "rng": rng, "oracle": oracle}
+    return plans(problem, k=None, side=side, **options)[0]
 
 
 def plans(
@@ -68,17 +72,20 @@ def plans(
     budget: Budget | None = None,
     rng: np.random.Generator | int | None = None,
     oracle: str = "geometry",
+    side: str | None = None,
 ) -> list[PlanResult]:
     """The k best plans, the likeliest first (planners whose traits say `k_best`); with None one, as `solve`."""
     searcher = load_planner(planner)
     generator = guarded(problem, searcher, k, budget, rng)
+    side = side_of(problem, searcher, side, alone=k is None and oracle == "geometry")
     scores = advice(problem, prior)
     by_geometry, start = oracle == "geometry", time.perf_counter()
     if by_geometry and (why_not := problem.semantics.refute(problem)) is not None:
         none = PlanResult(Status.UNSOLVABLE, None, 0, 0, 0, time.perf_counter() - start, why_not=why_not)
         return [none] if k is None else []
     with open_oracle(problem, oracle) as search:
-        results = search_and_check(problem, search, searcher, scores, k=k, budget=budget, rng=generator, oracle=oracle)
+        asked: dict[str, Any] = {"k": k, "budget": budget, "rng": generator, "oracle": oracle, "side": side}
+        results = search_and_check(problem, search, searcher, scores, **asked)
     return [_explained(problem, result) for result in results] if by_geometry else results
 
 
@@ -92,6 +99,7 @@ def search_and_check(
     budget: Budget | None = None,
     rng: np.random.Generator,
     oracle: str = "geometry",
+    side: str = "full",
 ) -> list[PlanResult]:
     """One planner's results on an opened oracle (with k the k best plans, else one result), each plan replayed.
 
@@ -100,6 +108,8 @@ def search_and_check(
     """
     if k is not None and isinstance(planner, KBestPlanner):
         results = planner.plans(search, scores, k=k, budget=budget, rng=rng)
+    elif side != "full" and isinstance(planner, TwoSidedPlanner):
+        results = [planner.plan_from(search, scores, side=side, budget=budget, rng=rng)]
     else:
         results = [planner.plan(search, scores, budget=budget, rng=rng)]
     results = [_bounded(search, result) for result in results]
@@ -173,4 +183,6 @@ def _explained(problem: Problem, result: PlanResult) -> PlanResult:
     """The result with why there is no plan, where the problem can tell. A budget that ended says nothing of it."""
     if result.status in (Status.SOLVED, Status.OUT_OF_BUDGET):
         return result
+    if result.side == "empty":
+        return replace(result, why_not=problem.semantics.explain_from_goal(problem, result.best_suffix or ()))
     return replace(result, why_not=problem.semantics.explain(problem, result.best_prefix))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -10,14 +11,14 @@ from numpy.typing import NDArray
 
 from neurosym.language.search_problem import Rejection
 from neurosym.planning.planner import PlannerTraits
-from neurosym.planning.result import PlanResult, Status
+from neurosym.planning.result import Status
 from planners.assignment_heuristic import RESOLUTION, AssignmentHeuristic
 from planners.node import Node
 from planners.search_context import SearchContext
-from planners.search_planner import SearchPlanner
+from planners.search_planner import Steps, TwoSidedSearchPlanner
 
 
-class Backtracking(SearchPlanner):
+class Backtracking(TwoSidedSearchPlanner):
     """Depth-first search that keeps the verified prefix, learns from every rejection, and leaves only dead states.
 
     With scores, the next action is the first of the cheapest completion (`planners.assignment_heuristic`) that is not
@@ -26,11 +27,13 @@ class Backtracking(SearchPlanner):
     used actions that was found dead is never entered again.
     """
 
-    traits = PlannerTraits(complete=True)
+    traits = PlannerTraits(complete=True, either_side=True)
 
-    def search(self, context: SearchContext) -> PlanResult:
-        goal = DepthFirst(context).run()
-        return context.failed(Status.UNSOLVABLE) if goal is None else context.solved(goal)
+    def steps(self, context: SearchContext) -> Steps:
+        goal = yield from DepthFirst(context).run()
+        if goal is None:
+            return context.failed(Status.UNSOLVABLE)
+        return context.solved(goal) if context.problem.is_goal(goal.state) else context.met(goal)
 
 
 @dataclass(slots=True, eq=False)
@@ -46,40 +49,62 @@ class DepthFirst:
         self.context = context
         heuristic = None if context.scores is None else AssignmentHeuristic(context.scores, context.rng)
         self.heuristic = None if heuristic is None or heuristic.indifferent else heuristic
+        self.dead: set[tuple[Any, int]] = set()
         self.rank = context.rng.permutation(len(context.classes))  # the last tie-breaker
 
-    def run(self) -> Node | None:
-        """Where the first plan ends, or None."""
+    def run(self) -> Generator[int, None, Node | None]:
+        """Where the first plan ends, or meets the search from the other side, or None; an attempt at a time."""
         context, is_goal = self.context, self.context.problem.is_goal
         root = _Node(context.problem.initial)
         if is_goal(root.state):
             return root
-        dead: set[tuple[Any, int]] = set()
-        root.untried = context.expand(root.state, root.used)
+        self._enter(root)
         node: _Node | None = root
         while node is not None:
             action = self._next_action(node)
             if action is None:
-                dead.add((node.state, node.used))
+                self.dead.add((node.state, node.used))
                 context.deviated = True
+                context.path.pop(node.state, None)
                 node = node.parent
                 continue
             answer = context.attempt(node, action)
             node.untried.remove(action)
             if isinstance(answer, Rejection):
                 context.learn(node, action, answer)
-                continue
-            child = node.child(action, answer)
-            if is_goal(child.state):
-                return child
-            if (child.state, child.used) not in dead:
-                child.untried = context.expand(child.state, child.used)
-                node = child
+            else:
+                child = node.child(action, answer)
+                if is_goal(child.state) or context.meets(child):
+                    return child
+                if (child.state, child.used) not in self.dead:
+                    self._enter(child)
+                    node = child
+            yield node.depth
         return None
+
+    def _enter(self, node: _Node) -> None:
+        context = self.context
+        node.untried = context.nogoods.allowed(node, context.expand(node.state, node.used))
+        context.path[node.state] = node
 
     def _next_action(self, node: _Node) -> int | None:
         """What to attempt at this node, or None when nothing is left."""
-        options = self.context.nogoods.allowed(node, node.untried)
+        while (action := self._foremost_untried(node)) is not None:
+            # What was learned below since this node was entered may refuse it by now.
+            if self._worth_asking(node, action):
+                return action
+            node.untried.remove(action)
+        return None
+
+    def _worth_asking(self, node: _Node, action: int) -> bool:
+        if not self.context.nogoods.allowed(node, (action,)):
+            return False
+        # From the full side what leads to a dead state is asked for even so: its rejections are what is counted.
+        after = getattr(self.context.problem, "apply", None) if self.context.from_goal else None
+        return after is None or (after(node.state, action), node.used | 1 << action) not in self.dead
+
+    def _foremost_untried(self, node: _Node) -> int | None:
+        options = node.untried
         if not options:
             return None
         if self.heuristic is None:
@@ -89,8 +114,12 @@ class DepthFirst:
             return completion[0]
         if node.values is None:
             self.context.deviated |= bool(node.completion)
-            assignment = self.heuristic.assign(node.depth, node.used)
-            node.values, node.completion = assignment.values, assignment.completion
+            if self.context.from_goal and self.context.scores is not None:
+                # From there most states are dead ends, and an assignment for each would cost more than all questions.
+                node.values = self.context.scores.costs[node.depth]
+            else:
+                assignment = self.heuristic.assign(node.depth, node.used)
+                node.values, node.completion = assignment.values, assignment.completion
         least = min(node.values[a] for a in options)
         return self._foremost([a for a in options if node.values[a] <= least + RESOLUTION])
 

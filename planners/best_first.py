@@ -19,10 +19,10 @@ from planners.assignment_heuristic import RESOLUTION, AssignmentHeuristic
 from planners.node import Node
 from planners.priorities import PartialPlan, Priority, astar, greedy, levin, weighted
 from planners.search_context import BudgetSpent, SearchContext
-from planners.search_planner import KBestSearchPlanner
+from planners.search_planner import KBestSearchPlanner, Steps, TwoSidedSearchPlanner
 
 
-class BestFirst(KBestSearchPlanner):
+class BestFirst(TwoSidedSearchPlanner, KBestSearchPlanner):
     """Lazy best-first search; complete, and with A* optimal.
 
     A* visits orders from the likeliest down; let run on, it gives the k best plans, whatever the priority.
@@ -37,7 +37,7 @@ class BestFirst(KBestSearchPlanner):
         weight: of the cost-to-go in "weighted"; at least 1.
     """
 
-    traits = PlannerTraits(complete=True, optimal=True, k_best=True)
+    traits = PlannerTraits(complete=True, optimal=True, k_best=True, either_side=True)
 
     def __init__(self, *, priority: str | Priority = "astar", weight: float = 2.0) -> None:
         if not weight >= 1:
@@ -48,16 +48,20 @@ class BestFirst(KBestSearchPlanner):
                 raise UnknownNameError("priority", priority, known)
             priority = known[priority]
         self.priority: Priority = priority
-        self.traits = PlannerTraits(complete=True, optimal=priority is astar, k_best=True)
+        self.traits = PlannerTraits(complete=True, optimal=priority is astar, k_best=True, either_side=True)
 
-    def search(self, context: SearchContext) -> PlanResult:
-        result = next(_BestFirst(context, self.priority, 1).results(), None)
-        return context.failed(Status.UNSOLVABLE) if result is None else result
+    def steps(self, context: SearchContext) -> Steps:
+        for at in _BestFirst(context, self.priority, 1).results():
+            if isinstance(at, PlanResult):
+                return at
+            yield at
+        return context.failed(Status.UNSOLVABLE)
 
     def search_k_best(self, context: SearchContext, k: int) -> list[PlanResult]:
         results: list[PlanResult] = []
         with suppress(BudgetSpent):
-            for result in islice(_BestFirst(context, astar, k).results(), k):
+            plans = (at for at in _BestFirst(context, astar, k).results() if isinstance(at, PlanResult))
+            for result in islice(plans, k):
                 results.append(result)  # noqa: PERF402 (what came before the budget's end is kept)
         return sorted(results, key=lambda result: result.cost or 0.0)
 
@@ -93,8 +97,11 @@ class _BestFirst:
         self.pushed = 0
         self.expanded: Counter[tuple[Any, int]] = Counter()
 
-    def results(self) -> Iterator[PlanResult]:
-        """Plans in the order of the priority; that it ends proves that there are no others."""
+    def results(self) -> Iterator[PlanResult | int]:
+        """Plans in the order of the priority; that it ends proves that there are no others.
+
+        After each attempt that ends in no plan the depth of the state in which it was made.
+        """
         context, is_goal = self.context, self.context.problem.is_goal
         root = _Node(context.problem.initial)
         if is_goal(root.state):
@@ -108,7 +115,7 @@ class _BestFirst:
             elif isinstance(entry, _Siblings):
                 self._queue_all(entry.node)
             elif (child := self._attempt(entry.node, entry.action, key)) is None:
-                continue
+                yield entry.node.depth
             elif is_goal(child.state):
                 to_go = context.length_cost(child.depth)
                 key = _rounded(self.priority(PartialPlan(child.depth, child.path_cost, to_go, child.log_policy)))
@@ -119,6 +126,7 @@ class _BestFirst:
             elif self.expanded[child.state, child.used] < self.k:
                 # The k cheapest orders that lead to a node are all that the k best plans can need of it.
                 self._expand(child)
+                yield entry.node.depth
 
     def _attempt(self, node: _Node, action: int, bound: float) -> _Node | None:
         """The node that `action` leads to; None when it is refused, or known to be."""

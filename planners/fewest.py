@@ -14,7 +14,7 @@ from neurosym.planning.result import PlanResult, Status
 from planners.backtracking import DepthFirst
 from planners.node import Node
 from planners.search_context import BudgetSpent, SearchContext
-from planners.search_planner import SearchPlanner
+from planners.search_planner import SearchPlanner, finish
 
 #: Attempts an action of the problem that the greedy search is given.
 GREEDY = 4
@@ -45,7 +45,7 @@ class Fewest(SearchPlanner):
         greedy = _Search(context, greedy=True, most=GREEDY * len(context.classes))
         first: Node | None = greedy.run() if _relaxed(context, greedy.root) is not None else None
         if first is None and not greedy.exhausted:
-            first = DepthFirst(context).run()
+            first = finish(DepthFirst(context).run())
         if first is None:
             return context.failed(Status.UNSOLVABLE)
         most = None if self.effort is None else context.log.attempts + self.effort

@@ -11,18 +11,26 @@ from planners.node import Node
 class Nogoods:
     """An action is refused until one of some others is done (`Rejection.until`).
 
-    Unconditional rejections promise it in every state, others below the node where they were met.
+    Unconditional rejections promise it in every state in which those of `given` are done, others below the node where
+    they were met.
+
+    Args:
+        beside: those of a search from the problem's other end. What is done in a state of one is what is not done there
+            in the other, so that what is promised everywhere serves both: `given` and `until` change places.
     """
 
-    def __init__(self) -> None:
-        self._everywhere: dict[int, set[int]] = {}
+    def __init__(self, beside: Nogoods | None = None) -> None:
+        #: Action -> pairs of bitsets, forwards: all of the first are done, none of the second.
+        self._everywhere: dict[int, set[tuple[int, int]]] = {} if beside is None else beside._everywhere
+        self._backwards = beside is not None
 
     def learn(self, node: Node, action: int, rejection: Rejection) -> None:
         """Keep what the rejection of `action` at `node` promises, if anything."""
         if rejection.until:
             until = sum(1 << a for a in set(rejection.until))
             if rejection.unconditional:
-                self._everywhere.setdefault(action, set()).add(until)
+                done, left = sum(1 << a for a in set(rejection.given)), until & ~(1 << action)
+                self._everywhere.setdefault(action, set()).add((left, done) if self._backwards else (done, left))
             # Actions done already cannot be done again, so they never end it: 0 means for ever.
             node.promises[action] = until & ~node.used
 
@@ -34,5 +42,7 @@ class Nogoods:
             if origin.promises:
                 refused.update(action for action, until in origin.promises.items() if not until & used)
             origin = origin.parent
-        everywhere = self._everywhere
-        return [a for a in actions if a not in refused and all(until & used for until in everywhere.get(a, ()))]
+        # Backwards the pairs change places: all of the second are done, none of the first.
+        done, left = (~used, used) if self._backwards else (used, ~used)
+        known = self._everywhere
+        return [a for a in actions if a not in refused and all(u & done or g & left for g, u in known.get(a, ()))]

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from neurosym.errors import InputError
+from neurosym.language.reversal import reversed_problem
 from neurosym.language.search_problem import Rejection, SearchProblem, Step
 from neurosym.planning.budget import Budget
 from neurosym.planning.order_scores import OrderScores
@@ -29,6 +30,8 @@ class SearchContext:
     Attributes:
         scores: checked against the problem's actions, with interchangeable actions sharing their probability.
         deviated: whether the search had to leave the first complete order that it tried.
+        beside: that of a search of the same problem from its other end, if there is one.
+        path: of a depth-first search, the nodes from its root to where it is, by their states.
     """
 
     def __init__(
@@ -37,16 +40,35 @@ class SearchContext:
         scores: OrderScores | None = None,
         budget: Budget | None = None,
         rng: np.random.Generator | None = None,
+        *,
+        beside: SearchContext | None = None,
     ) -> None:
-        self.problem = problem
+        self.problem, self.beside = problem, beside
+        if beside is not None:
+            beside.beside = self
         self.classes = tuple(problem.classes)
         self.scores = None if scores is None else _fitted(scores, tuple(problem.actions), self.classes)
         self.rng = rng or np.random.default_rng(0)
-        self.log = SearchLog(problem, budget)
-        self.nogoods = Nogoods()
+        self.log: SearchLog[Any] = SearchLog(problem, budget, beside=None if beside is None else beside.log)
+        self.path: dict[Any, Node] = {}
+        self.nogoods: Nogoods = Nogoods(None if beside is None else beside.nogoods)
         self.preferred = PreferredActions(problem.actions)
         self.deviated = False
         self._answers: dict[tuple[Any, int], Step[Any] | Rejection] = {}
+
+    @classmethod
+    def from_empty(cls, full: SearchContext) -> SearchContext | None:
+        """That of the search from the goal, beside one from the initial state; None where the problem has none."""
+        problem = reversed_problem(full.problem)
+        if problem is None:
+            return None
+        scores = None if full.scores is None else full.scores.reversed()
+        return cls(problem, scores, full.log.budget, full.rng.spawn(1)[0], beside=full)
+
+    @property
+    def from_goal(self) -> bool:
+        """Whether this is the search from the goal."""
+        return self.log.side == "empty"
 
     def check_budget(self) -> None:
         if self.log.out_of_budget():
@@ -97,8 +119,27 @@ class SearchContext:
 
     def solved(self, node: Node, *, fewest: bool | None = None) -> PlanResult:
         """The result for the plan that led to `node`; whether it has the fewest actions, as far as that is known."""
-        motions, failed = [at.motion for at in node.path()], self.deviated or self.log.iterations > 0
-        return self.log.solved(node.prefix(), motions, scores=self.scores, first_guess_failed=failed, fewest=fewest)
+        if self.beside is not None and self.from_goal:
+            return self._solved(node.path()[::-1], self.beside.scores)
+        return self._solved(node.path(), self.scores, fewest)
+
+    def meets(self, node: Node) -> bool:
+        """Whether the search from the other end is at the state of `node`."""
+        return self.beside is not None and node.state in self.beside.path
+
+    def met(self, node: Node) -> PlanResult:
+        """The result where it is."""
+        assert self.beside is not None
+        other = self.beside.path[node.state]
+        full, first, then = (self.beside, other, node) if self.from_goal else (self, node, other)
+        return replace(full._solved([*first.path(), *then.path()[::-1]], full.scores), side="both")
+
+    def _solved(
+        self, nodes: Sequence[Node], scores: OrderScores | None, fewest: bool | None = None
+    ) -> PlanResult:
+        plan, motions = [node.action for node in nodes], [node.motion for node in nodes]
+        failed = self.deviated or self.log.iterations > 0
+        return self.log.solved(plan, motions, scores=scores, first_guess_failed=failed, fewest=fewest)
 
     def failed(self, status: Status) -> PlanResult:
         """The result for a search without a plan."""

@@ -83,29 +83,66 @@ def count_plans(problem: SearchProblem[Any]) -> int:
 
 
 def count_orders(problem: SearchProblem[Any], *, budget: Budget | None = None) -> OrderCount:
-    """The same within a budget: orders are summed forwards, a layer of states at a time, and only two are kept."""
-    context = _context(problem, budget)
-    log = context.log
-    leading: dict[tuple[Any, int], int] = {(context.problem.initial, 0): 1}  # how many orders lead there
+    """The same within a budget: orders are summed a layer of states at a time, and only two are kept.
+
+    Where the problem can be searched from its goal, too, each layer is the next one of the side that has less to ask
+    for it, until the two meet.
+    """
+    full = _context(problem, budget)
+    empty = SearchContext.from_empty(full)
+    if empty is not None:
+        return _count_from_both(full, empty)
+    log = full.log
+    leading: dict[tuple[Any, int], int] = {(full.problem.initial, 0): 1}  # how many orders lead there
     orders = states = 0
     while leading:
-        below: dict[tuple[Any, int], int] = {}
+        waiting = {}
         for (state, used), count in leading.items():
-            states += 1
-            if context.problem.is_goal(state):
+            if full.problem.is_goal(state):
                 orders += count
-                continue
-            try:
-                actions = context.expand(state, used)
-            except BudgetSpent:
-                return OrderCount(None, False, states, log.seconds)
-            for action in actions:
-                answer = log.attempt((), state, action)
-                if isinstance(answer, Step):
-                    key = answer.state, used | 1 << action
-                    below[key] = below.get(key, 0) + count
-        leading = below
+            else:
+                waiting[state, used] = count
+        states += len(leading)
+        try:
+            leading = _next_layer(full, waiting)
+        except BudgetSpent:
+            return OrderCount(None, False, log.expansions, log.seconds)
     return OrderCount(orders, log.all_proved, states, log.seconds)
+
+
+def _count_from_both(full: SearchContext, empty: SearchContext) -> OrderCount:
+    """The count where every order does all actions, and states of both sides that are one state meet."""
+    log, left = full.log, len(full.classes)
+    layers = {side: {(side.problem.initial, 0): 1} for side in (full, empty)}
+    done = dict.fromkeys(layers, 0)
+    while done[full] + done[empty] < left and all(layers.values()):
+        # A question is taken to cost the square of the number of actions that are not done, as parts are there.
+        work = {full: len(layers[full]) * (left - done[full]) ** 2, empty: len(layers[empty]) * (1 + done[empty]) ** 2}
+        side = min(work, key=work.__getitem__)
+        try:
+            layers[side] = _next_layer(side, layers[side])
+        except BudgetSpent:
+            return OrderCount(None, False, log.expansions, log.seconds)
+        done[side] += 1
+    ends = {state: count for (state, _), count in layers[empty].items()}
+    orders = sum(count * ends.get(state, 0) for (state, _), count in layers[full].items())
+    looked_at = log.expansions + len(layers[full])
+    return OrderCount(orders, log.all_proved and empty.log.all_proved, looked_at, log.seconds)
+
+
+def _next_layer(context: SearchContext, layer: dict[tuple[Any, int], int]) -> dict[tuple[Any, int], int]:
+    """The states that one action more leads to, each with how many orders lead there."""
+    below: dict[tuple[Any, int], int] = {}
+    for (state, used), count in layer.items():
+        node = Node(state, used)
+        for action in context.nogoods.allowed(node, context.expand(state, used)):
+            answer = context.log.attempt((), state, action)
+            if isinstance(answer, Step):
+                key = answer.state, used | 1 << action
+                below[key] = below.get(key, 0) + count
+            else:
+                context.nogoods.learn(node, action, answer)
+    return below
 
 
 def order_marginals(problem: SearchProblem[Any]) -> NDArray[np.float64]:

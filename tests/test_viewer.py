@@ -1043,6 +1043,23 @@ def test_a_refusal_shows_what_stood_in_the_way(viewer, exhibit):
     assert dict(zip(exhibit.timeline.names, [tuple(part.color) for part in viewer.scene.parts])) == own
 
 
+def test_what_cannot_be_built_up_is_faint(viewer, exhibit):
+    cells = {"foot": [(0, 0, 0)], "left": [(2, 0, 0), (2, 0, 1), (3, 0, 1), (4, 0, 1)]}
+    cells["right"] = [(7, 0, 0), (7, 0, 1), (6, 0, 1), (5, 0, 1)]
+    problem = ns.load_domain("assembly").problem(ns.Assembly.from_cells(cells, friction=0.9))
+    result = ns.solve(problem, side="empty")
+    shown = Exhibit.of(problem, Search.of(result, Query("assembly"), None))
+    assert shown.buildable == ("foot",)
+    viewer.show(shown)
+    assert [part.opacity is None for part in viewer.scene.parts] == [True, False, False]
+    viewer._clicked("left")
+    viewer._clicked("left")
+    assert [part.opacity is None for part in viewer.scene.parts] == [True, False, False]
+    assert "Faint in the view" in viewer.plan_tab.content
+    viewer.show(exhibit)
+    assert {part.opacity for part in viewer.scene.parts} == {None}
+
+
 def test_a_late_click_on_what_was_shown_before_changes_nothing(viewer, exhibit):
     viewer.show(exhibit)
     viewer._clicked("no longer there")

@@ -37,7 +37,7 @@ class Fall:
     """Parts that would fall if others left.
 
     Attributes:
-        without: names of the parts that would leave; none, where these fall as it is.
+        without: names of the parts that would leave, or, of what is built up, come; none, where these fall as it is.
         parts: names of those that would fall.
         lost: pairs (a, b): a falls, and touched b, which would leave.
         held: how many parts may be held, which does not help.
@@ -67,6 +67,8 @@ class WhyNot:
         waiting: pairs (a, b): a could go, but only after b.
         unproved: names of parts for which a search for a way ended without a proof that there is none.
         relaxed: whether gravity and precedence were left aside: even so there is no plan. `after` then need not work.
+        building: of a search from the empty side, the names of the parts that are there from its beginning; else None.
+            Then `after` is what can be put in place at the most, as the end of a plan, and `left` what cannot.
     """
 
     after: tuple[str, ...]
@@ -77,10 +79,13 @@ class WhyNot:
     waiting: tuple[tuple[str, str], ...] = ()
     unproved: tuple[str, ...] = ()
     relaxed: bool = False
+    building: tuple[str, ...] | None = None
 
     @property
     def sentences(self) -> tuple[str, ...]:
         """The same for a person; what is long is cut, with a count."""
+        if self.building is not None:
+            return self._of_building(self.building)
         start = f"After {listed(self.after)} nothing" if self.after else "Nothing"
         relaxed = ", even if nothing could fall and any order would do" if self.relaxed else ""
         said = [f"{start} can be taken out of {listed(self.left)}{relaxed}."]
@@ -107,6 +112,16 @@ class WhyNot:
                 f"For {listed(self.unproved)} the search for a way ended without one, which proves nothing: "
                 "more directions or a larger budget may find it."
             )
+        return tuple(said)
+
+    def _of_building(self, base: tuple[str, ...]) -> tuple[str, ...]:
+        start, loose = f"From {listed(base) or 'the table'} alone", len(self.after) + len(self.left)
+        placed = f": {listed(self.after[::-1])}" if self.after else ""
+        said = [f"{start} only {len(self.after)} of {loose} parts can be put in place one by one{placed}."]
+        blocked = list(dict.fromkeys(b.part for b in self.blocked))
+        said += _first([f"{part} has no way in any more." for part in blocked], "parts have no way in")
+        said += _first([_fall(f, "With") for f in self.falls], "parts could come next, but something would fall")
+        said += _first([f"{b} may come only after {a}." for a, b in self.waiting], "parts wait for others")
         return tuple(said)
 
     def as_json(self) -> dict[str, Any]:
@@ -177,7 +192,7 @@ def _shortest(along: Sequence[int], there: int, below: int) -> tuple[int, ...]:
     return best
 
 
-def _fall(fall: Fall) -> str:
+def _fall(fall: Fall, when: str = "Without") -> str:
     lost = [f"{a} loses {b}" for a, b in fall.lost]
     held = "" if not fall.held else f", whichever {'part' if fall.held == 1 else f'{fall.held} parts'} one holds"
     cause = f" ({'; '.join(lost[:LISTED])}{'; ...' if len(lost) > LISTED else ''})" if lost else ""
@@ -186,7 +201,7 @@ def _fall(fall: Fall) -> str:
         return f"It does not stand as it is: {listed(fall.parts)} would fall{held}.{moves}"
     if fall.drawn:
         return f"Drawn {fall.drawn}, {listed(fall.without)} would drag {listed(fall.parts)} along{held}.{moves}"
-    return f"Without {listed(fall.without)}, {listed(fall.parts)} would fall{held}{cause}.{moves}"
+    return f"{when} {listed(fall.without)}, {listed(fall.parts)} would fall{held}{cause}.{moves}"
 
 
 def _first(sentences: list[str], what: str) -> list[str]:

@@ -4,17 +4,33 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from neurosym.errors import ContractError, DefinitionError, InputError, UnknownNameError
 from neurosym.geometry.step_motion import StepMotion
 from neurosym.language.actions import moved_parts
 from neurosym.language.instances import Instance, check_precedence, instantiate, reachable_instances
 from neurosym.language.search_problem import Rejection, RelaxedPlan, Step, Verdict
+from neurosym.language.state import BitState
 from neurosym.language.terms import Atom, Derived, Fluent, Literal
 
 if TYPE_CHECKING:
     from neurosym.language.problem import Problem
+
+
+class Refused(NamedTuple):
+    """A derived predicate that does not allow an action."""
+
+    predicate: Derived
+    args: tuple[str, ...]
+    positive: bool  # whether it had to hold
+    verdict: Verdict
+
+    @property
+    def sentence(self) -> str:
+        """Why."""
+        named = f"{self.predicate}({', '.join(self.args)})"
+        return self.verdict.reason or f"{named} {'does not hold' if self.positive else 'holds'}."
 
 
 class GroundProblem:
@@ -71,7 +87,7 @@ class GroundProblem:
             return False
         view = BitState(self, state)
         return all(
-            _ask(g.atom.predicate, self.world, view, g.atom.args).holds is g.positive  # type: ignore[arg-type]
+            self.judge(g.atom.predicate, view, g.atom.args).holds is g.positive  # type: ignore[arg-type]
             for g in self._derived_goals
         )
 
@@ -83,23 +99,43 @@ class GroundProblem:
             if (state & pos) == pos and not state & neg
         ]
 
+    def is_applicable(self, state: int, action: int) -> bool:
+        """Whether `action` is one of the candidates in `state`."""
+        pos = self._pos[action]
+        return (state & pos) == pos and not state & self._neg[action]
+
     def attempt(self, state: int, action: int) -> Step[int] | Rejection:
         """Ask the derived predicates of `action`, in their order; the first refusal is the answer."""
-        if (state & self._pos[action]) != self._pos[action] or state & self._neg[action]:
+        if not self.is_applicable(state, action):
             return self._not_applicable(state, action)
+        refused, motion = self.ask(state, action)
+        return Step(self.apply(state, action), motion) if refused is None else self._rejection(state, action, refused)
+
+    def ask(self, state: int, action: int) -> tuple[Refused | None, StepMotion | None]:
+        """The first derived predicate of `action` that does not allow it in `state`; if all do, how it moves parts."""
         motion: StepMotion | None = None
         view = BitState(self, state)
         for predicate, args, positive in self._derived[action]:
-            verdict = _ask(predicate, self.world, view, args)
+            verdict = self.judge(predicate, view, args)
             if verdict.holds is not positive:
-                return self._rejection(state, action, predicate, args, positive, verdict)
+                return Refused(predicate, args, positive, verdict), None
             if verdict.motion is not None:
                 stated = _as_motion(predicate, verdict.motion)
                 motion = stated if motion is None else motion.joined(stated)
         if motion is not None:
             parts, arrive = moved_parts(self._effects[action], getattr(self.world, "names", ()))
             motion = motion.of_parts(parts, arrive=arrive)
-        return Step(self.apply(state, action), motion)
+        return None, motion
+
+    def judge(self, predicate: Derived, view: BitState, args: tuple[str, ...] = ()) -> Verdict:
+        """What a derived predicate says of a state."""
+        verdict = predicate.function(self.world, view, *args)
+        if not isinstance(verdict, Verdict):
+            raise ContractError(
+                f"Expected the derived predicate {predicate} to answer with a Verdict; got {verdict!r}. "
+                "Write ns.Verdict(holds, because=(...), reason='...')."
+            )
+        return verdict
 
     def apply(self, state: int, action: int) -> int:
         """The state after the effects of `action`, no question asked."""
@@ -108,6 +144,24 @@ class GroundProblem:
     def relaxed_plan(self, state: int) -> RelaxedPlan | None:
         """See `RelaxedPlan`."""
         return self.problem.semantics.relaxed_plan(self.problem, state)
+
+    @property
+    def asked(self) -> int:
+        """A bitset of the fluents that the goal asks for."""
+        return self._goal_pos | self._goal_neg
+
+    @property
+    def asks_fluents_only(self) -> bool:
+        """Whether the goal asks for nothing derived."""
+        return not self._derived_goals
+
+    def derived_of(self, action: int) -> tuple[Derived, ...]:
+        """The derived predicates that must hold where `action` is done."""
+        return tuple(predicate for predicate, _, positive in self._derived[action] if positive)
+
+    def touching(self, atom: Atom) -> tuple[int, ...]:
+        """The actions that change a fluent."""
+        return self._touching.get(atom, ())
 
     # -- for people and oracles -------------------------------------------------------------------------------
 
@@ -123,14 +177,12 @@ class GroundProblem:
                 missing.append(f"{self.actions[predecessor]} to be done before")
         return Rejection(f"{self.actions[action]} is not applicable: it needs {', '.join(missing)}.")
 
-    def _rejection(
-        self, state: int, action: int, predicate: Derived, args: tuple[str, ...], positive: bool, verdict: Verdict
-    ) -> Rejection:
-        said = verdict.reason or f"{predicate}({', '.join(args)}) {'does not hold' if positive else 'holds'}."
+    def _rejection(self, state: int, action: int, refused: Refused) -> Rejection:
+        verdict, said = refused.verdict, refused.sentence
         # A promise speaks of a verdict that stays false; it says nothing of one that must become false.
         if not verdict.proved:
             return Rejection(said, verdict.because, proved=False)
-        if not positive or verdict.until is None:
+        if not refused.positive or verdict.until is None:
             return Rejection(said, verdict.because, ())
         known = self._promises.get(verdict.until)
         if known is None:
@@ -206,43 +258,6 @@ class GroundProblem:
             for member in members:
                 classes[member] = members[0]
         return tuple(classes)
-
-
-class BitState:
-    """A bitset state as derived predicates see it."""
-
-    __slots__ = ("_bits", "_ground")
-
-    def __init__(self, ground: GroundProblem, bits: int) -> None:
-        self._ground = ground
-        self._bits = bits
-
-    def holds(self, atom: Atom) -> bool:
-        bit = self._ground._bits.get(atom)
-        return bit is not None and bool(self._bits >> bit & 1)
-
-    def objects(self, fluent: Fluent) -> tuple[str, ...]:
-        start, names = self._ground.runs[fluent]
-        run = self._bits >> start
-        return tuple(name for i, name in enumerate(names) if run >> i & 1)
-
-    def mask(self, fluent: Fluent, names: tuple[str, ...]) -> int:
-        start, own = self._ground.runs[fluent]
-        if own == names:
-            return (self._bits >> start) & ((1 << len(own)) - 1)
-        position = {name: i for i, name in enumerate(own)}
-        run = self._bits >> start
-        return sum(1 << i for i, name in enumerate(names) if name in position and run >> position[name] & 1)
-
-
-def _ask(predicate: Derived, world: object, view: BitState, args: tuple[str, ...]) -> Verdict:
-    verdict = predicate.function(world, view, *args)
-    if not isinstance(verdict, Verdict):
-        raise ContractError(
-            f"Expected the derived predicate {predicate} to answer with a Verdict; got {verdict!r}. "
-            "Write ns.Verdict(holds, because=(...), reason='...')."
-        )
-    return verdict
 
 
 def _as_motion(predicate: Derived, given: Any) -> StepMotion:

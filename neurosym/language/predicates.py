@@ -11,6 +11,7 @@ parts also return must pass ``removal=False``.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -132,7 +133,7 @@ def stable_without(present: Fluent, *, removal: bool = True, held: int = 0) -> D
 
     def ask(world: AssemblyGeometry, state: State, p: str) -> Verdict:
         rest = state.mask(present, world.names) & ~(1 << world.index[p])
-        return stands(world, rest, (p,), present if removal and not held else None, held)
+        return stands(world, rest, (p,), present, held, removal=removal and not held)
 
     def check(world: AssemblyGeometry, state: State, motion: StepMotion, p: str) -> Verdict:
         hands = motion.held
@@ -146,35 +147,56 @@ def stable_without(present: Fluent, *, removal: bool = True, held: int = 0) -> D
     def formula(world: AssemblyGeometry, p: str) -> formulas.Stands:
         return formulas.Stands(present, p, held)
 
-    return Derived("stable_without", [part], ask, check=check, formula=formula)
+    return Derived("stable_without", [part], ask, check=check, formula=formula, after=stands_there(present, held))
+
+
+def stands_there(present: Fluent, held: int = 0) -> Derived:
+    """``stands_there()``: the parts present stand still under gravity, `held` of them held at the most."""
+
+    def ask(world: AssemblyGeometry, state: State) -> Verdict:
+        return stands(world, state.mask(present, world.names), (), present, held)
+
+    return Derived("stands_there", [], ask)
 
 
 def stands(
-    world: AssemblyGeometry, rest: int, leaving: Sequence[str], present: Fluent | None = None, held: int = 0
+    world: AssemblyGeometry,
+    rest: int,
+    leaving: Sequence[str],
+    present: Fluent | None = None,
+    held: int = 0,
+    *,
+    removal: bool = False,
 ) -> Verdict:
     """Whether the parts in the bitset `rest` stand once those in `leaving` are gone.
 
     Args:
         present: the fluent that says which parts are there, for a verdict that promises; None promises nothing.
         held: how many may be held.
+        removal: parts that left do not come back, so that the parts that move are all that a promise rests on.
     """
     said = ", ".join(leaving)
     answer = world.stability.standing_when_held(rest, held) if held else world.stability.standing(rest)
     if answer.stands:
         motion = StepMotion(held=world.in_mask(answer.held)) if answer.held else None
         return Verdict(True, (), f"The others stand without {said}.", motion=motion)
-    # The motion stays possible while every part that moves in it is there. Those that go along are named besides: that
-    # promises less, and gives planners more to try next.
     verdict = _falls(world, answer.falling, leaving, held)
     if present is None or not answer.promises:
         return verdict
-    return replace(verdict, until=tuple(Atom(present, (n,)) for n in verdict.because))
+    # The motion stays possible while every part that moves in it is there, whatever else has left, and whatever comes
+    # that touches none of them: all others are immovable in it. Those that go along are named besides: that promises
+    # less, and gives planners more to try next.
+    named = tuple(Atom(present, (n,)) for n in verdict.because)
+    near = functools.reduce(int.__or__, (world.stability.touching[p] for p in bits(answer.moving)), 0)
+    absent = near & ~rest & ~answer.moving & ~world.mask(leaving)
+    decided_by = tuple(Atom(present, (n,)) for n in world.in_mask(answer.moving | absent))
+    return replace(verdict, until=named if removal else None, decided_by=decided_by)
 
 
 def _falls(world: AssemblyGeometry, moving: int, leaving: Sequence[str], held: int) -> Verdict:
     falling = world.in_mask(moving)
     lost = losses(world, moving, world.mask(leaving))
-    said = f"Without {listed(leaving)}, {listed(falling)} would fall"
+    said = f"Without {listed(leaving)}, {listed(falling)} would fall" if leaving else f"{listed(falling)} would fall"
     if held:
         said += f", whichever {'part' if held == 1 else f'{held} parts'} one holds"
     if lost:

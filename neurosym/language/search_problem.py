@@ -31,6 +31,9 @@ class Verdict:
             that it never will. Planners learn from it, so it must be sound.
         unconditional: a stronger promise: the verdict does not depend on the rest of the state. It does not hold in
             any state in which the atoms of `until` are as they are now, whether or not it comes after this one.
+        decided_by: the same promise for a state from which atoms may change either way, which a search from the goal
+            needs: it does not hold in any state in which all these atoms are as they are now. `None` promises nothing,
+            but where `unconditional` says that `until` will do.
         motion: for a verdict that holds, what it says of how the action may move parts, kept in the plan; a direction
             will do. Which parts move, and whether in or out, follows from the action's effects unless it says so.
         proved: for a verdict that does not hold, whether that is certain. A search for a path that ended without one
@@ -44,6 +47,7 @@ class Verdict:
     motion: StepMotion | None = None
     unconditional: bool = False
     proved: bool = True
+    decided_by: tuple[Atom, ...] | None = None
 
     def __bool__(self) -> bool:
         return self.holds
@@ -69,10 +73,12 @@ class Rejection:
             names itself. Planners prune by it, so it must be sound.
         unconditional: the promise holds in every state of the problem before one of `until` is done, not only in
             those reached from this one: what was learned in one branch of a search serves in all.
+        given: indices of actions. An unconditional promise holds in those states alone in which all these are done.
         proved: whether the action is impossible for certain. A planner that met a rejection which is not must not
             call a problem unsolvable (`SearchLog.failed` sees to it).
         action: name of the action, in a result (`PlanResult.blame`).
-        after: names of the actions that were done before it, likewise.
+        after: names of the actions that were done before it, likewise; from the empty side, of those undone before it.
+        side: from which side of the problem it was asked, "full" or "empty", likewise.
     """
 
     reason: str
@@ -80,8 +86,10 @@ class Rejection:
     until: tuple[int, ...] = ()
     unconditional: bool = False
     proved: bool = True
+    given: tuple[int, ...] = ()
     action: str = field(default="", kw_only=True)
     after: tuple[str, ...] = field(default=(), kw_only=True)
+    side: str = field(default="full", kw_only=True)
 
 
 class RelaxedPlan(NamedTuple):
@@ -101,6 +109,9 @@ class SearchProblem(Protocol[S]):
 
     Two more are looked for: ``relaxed_plan(state)``, a `RelaxedPlan` or None, and ``exhaustive``, False where an action
     stands for several ways of which only one is tried, so that no search proves that a plan has the fewest actions.
+
+    One of another kind than ground symbols that can be searched from its goal, too, has one method more: ``reversed()``
+    gives the `SearchProblem` from there (`neurosym.language.reversal`).
 
     Attributes:
         actions: names of the N action primitives, in the order in which priors score them. Each can be

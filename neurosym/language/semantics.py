@@ -50,6 +50,10 @@ class Semantics:
         """What planners see: by default the ground symbols, which name the actions, precedence and goal in any case."""
         return problem.symbols
 
+    def side(self, problem: Problem) -> str:
+        """From where it is searched unless somebody says otherwise: see `planning.planner.SIDES`."""
+        return "full"
+
     def replay(self, problem: Problem, order: Sequence[str], motions: Sequence[StepMotion | None]) -> Validation | None:
         """See `validate`: shares no table with `search` and asks the world anew. None: by the symbols."""
         return None
@@ -64,6 +68,10 @@ class Semantics:
 
     def explain(self, problem: Problem, done: Sequence[str]) -> WhyNot | None:
         """Why a search that ended got no further than `done`, the longest prefix that works; None: it cannot tell."""
+        return None
+
+    def explain_from_goal(self, problem: Problem, undone: Sequence[str]) -> WhyNot | None:
+        """The same for a search from the goal: why no more can be undone than `undone`, the longest end of an order."""
         return None
 
     def observe(self, problem: Problem) -> NDArray[np.uint8] | None:

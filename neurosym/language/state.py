@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from neurosym.language.terms import Atom, Fluent
+
+if TYPE_CHECKING:
+    from neurosym.language.grounding import GroundProblem
 
 
 class State(Protocol):
@@ -39,3 +42,30 @@ class AtomSet:
 
     def mask(self, fluent: Fluent, names: tuple[str, ...]) -> int:
         return sum(1 << i for i, name in enumerate(names) if Atom(fluent, (name,)) in self.atoms)
+
+
+class BitState:
+    """A bitset of a grounded problem as a state."""
+
+    __slots__ = ("_bits", "_ground")
+
+    def __init__(self, ground: GroundProblem, bits: int) -> None:
+        self._ground = ground
+        self._bits = bits
+
+    def holds(self, atom: Atom) -> bool:
+        bit = self._ground._bits.get(atom)
+        return bit is not None and bool(self._bits >> bit & 1)
+
+    def objects(self, fluent: Fluent) -> tuple[str, ...]:
+        start, names = self._ground.runs[fluent]
+        run = self._bits >> start
+        return tuple(name for i, name in enumerate(names) if run >> i & 1)
+
+    def mask(self, fluent: Fluent, names: tuple[str, ...]) -> int:
+        start, own = self._ground.runs[fluent]
+        if own == names:
+            return (self._bits >> start) & ((1 << len(own)) - 1)
+        position = {name: i for i, name in enumerate(own)}
+        run = self._bits >> start
+        return sum(1 << i for i, name in enumerate(names) if name in position and run >> position[name] & 1)

@@ -120,9 +120,12 @@ class Derived(_Predicate):
             instead of `function`: what was found once need not be found again, but must hold.
         formula: takes the world and the names of the objects, and says for all states at once when it holds (None: it
             cannot say). Whoever writes the problem down for other programs asks it.
+        after: a predicate of no objects that holds in the state after an action exactly when this one, as a
+            precondition, held before it. A search from the goal asks it of a state once, not of each action that may
+            lead there.
     """
 
-    __slots__ = ("check", "formula", "function")
+    __slots__ = ("after", "check", "formula", "function")
 
     def __init__(
         self,
@@ -132,11 +135,13 @@ class Derived(_Predicate):
         *,
         check: Callable[..., Verdict] | None = None,
         formula: Callable[..., Formula | None] | None = None,
+        after: Derived | None = None,
     ) -> None:
         super().__init__(name, types)
         self.function = function
         self.check = check
         self.formula = formula
+        self.after = after
 
 
 def derived(*types: Type) -> Callable[[Callable[..., Verdict]], Derived]:

@@ -49,12 +49,10 @@ class SavedPlan:
         try:
             return Account(
                 Status[document["status"]],
-                tuple(
-                    Rejection(str(r["reason"]), tuple(r["because"]), action=str(r["action"]), after=tuple(r["after"]))
-                    for r in document["refusals"]
-                ),
+                tuple(map(_rejection, document["refusals"])),
                 {name: document[name] for name in COUNTS if isinstance(document[name], int | float)},
                 tuple(map(str, (document.get("why_not") or {}).get("sentences", ()))),
+                None if (end := document.get("best_suffix")) is None else tuple(map(str, end)),
             )
         except (AttributeError, KeyError, TypeError) as error:
             raise InputError(f"Expected a plan's file as `neurosym plan --out` writes it; got {error!r}.") from None
@@ -62,12 +60,21 @@ class SavedPlan:
 
 @dataclass(frozen=True, eq=False)
 class Account:
-    """What a plan's file tells of its search: `counts` are figures by name, `why_not` is in sentences."""
+    """What a plan's file tells of its search: `counts` are figures by name, `why_not` is in sentences.
+
+    The longest end of an order that was verified from the goal is `best_suffix`; None: it was not searched from there.
+    """
 
     status: Status
     refusals: tuple[Rejection, ...]
     counts: Mapping[str, float]
     why_not: tuple[str, ...]
+    best_suffix: tuple[str, ...] | None = None
+
+
+def _rejection(given: Mapping[str, Any]) -> Rejection:
+    action, after, side = str(given["action"]), tuple(given["after"]), str(given.get("side", "full"))
+    return Rejection(str(given["reason"]), tuple(given["because"]), action=action, after=after, side=side)
 
 
 def read_search(path: str | Path) -> SavedPlan:

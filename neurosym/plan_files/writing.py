@@ -30,8 +30,10 @@ def result_part(result: PlanResult) -> dict[str, Any]:
         "plan": None if result.plan is None else list(result.plan),
         "steps": [{"action": a, **(motion.to_json() if motion else {"how": None})} for a, motion in steps],
         "best_prefix": list(result.best_prefix),
+        "side": result.side,
+        "best_suffix": None if result.best_suffix is None else list(result.best_suffix),
         "refusals": [
-            {"after": list(r.after), "action": r.action, "reason": r.reason, "because": list(r.because)}
+            {"after": list(r.after), "action": r.action, "reason": r.reason, "because": list(r.because), "side": r.side}
             for r in result.blame
         ],
         **{name: getattr(result, name) for name in ("iterations", "expansions", "attempts", "seconds", "cost")},

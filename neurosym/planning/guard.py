@@ -6,10 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from neurosym.errors import InputError
+from neurosym.errors import InputError, UnknownNameError
 from neurosym.language.problem import Problem
+from neurosym.language.reversal import reversed_problem
 from neurosym.planning.budget import Budget
-from neurosym.planning.planner import KBestPlanner, Planner
+from neurosym.planning.planner import SIDES, KBestPlanner, Planner, TwoSidedPlanner
 
 
 def guarded(problem: object, planner: Planner, k: object, budget: object, rng: Any) -> np.random.Generator:
@@ -33,3 +34,31 @@ def guarded(problem: object, planner: Planner, k: object, budget: object, rng: A
     if isinstance(rng, int | np.integer) and not isinstance(rng, bool) and rng >= 0:
         return np.random.default_rng(rng)
     raise InputError(f"Expected rng as a numpy Generator or a seed of 0 or more; got {rng!r}.")
+
+
+def side_of(problem: Problem, planner: Planner, side: str | None, *, alone: bool) -> str:
+    """From which side to search: what was asked for, or the problem's own; where only "full" can be, that.
+
+    Args:
+        alone: whether geometry answers, and one plan is asked for.
+
+    Raises:
+        InputError: "empty" was asked for, and cannot be.
+    """
+    if side is not None and side not in SIDES:
+        raise UnknownNameError("side", side, SIDES)
+    wanted = problem.semantics.side(problem) if side is None else side
+    if wanted == "full":
+        return wanted
+    hindrances = {
+        f"the planner {type(planner).__name__} searches from one end only": not (
+            planner.traits.either_side and isinstance(planner, TwoSidedPlanner)
+        ),
+        "a simulation only takes away, and several plans are looked for from one end": not alone,
+        "not every action is asked for by the goal, once, beside others that change something else": alone
+        and reversed_problem(problem.ground()) is None,
+    }
+    why = next((said for said, hinders in hindrances.items() if hinders), None)
+    if why is not None and side == "empty":
+        raise InputError(f"Expected a search that can begin at the goal for side 'empty'; {why}. Take side 'full'.")
+    return wanted if why is None else "full"

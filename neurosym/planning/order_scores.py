@@ -133,6 +133,12 @@ class OrderScores:
         order = self.order(rng)
         return tuple(self.actions[a] for a in order) if self.actions else tuple(map(str, order))
 
+    def reversed(self) -> OrderScores:
+        """The scores of the same actions in reverse order, all of them, with the steps counted from the end."""
+        missing = self.n_actions - self.n_steps
+        rows = np.concatenate([self.log_prob, np.zeros((missing, self.n_actions))])
+        return OrderScores(rows[::-1], self.actions, classes=self.classes)
+
     def restricted(self, actions: Sequence[str]) -> OrderScores:
         """The scores for a task of which some actions are done already: the last steps, the remaining columns.
 

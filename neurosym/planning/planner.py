@@ -24,12 +24,14 @@ class PlannerTraits:
         optimal: its plan has the least total prior cost of all plans.
         uses_scores: a prior changes what it does.
         k_best: `plans(k=...)` gives the k best plans; it is a `KBestPlanner`.
+        either_side: `plan_from(side=...)` searches from the goal, too; it is a `TwoSidedPlanner`.
     """
 
     complete: bool
     optimal: bool = False
     uses_scores: bool = True
     k_best: bool = False
+    either_side: bool = False
 
 
 class Planner(ABC):
@@ -73,6 +75,28 @@ class KBestPlanner(Protocol):
         budget: Budget | None = None,
         rng: np.random.Generator | None = None,
     ) -> list[PlanResult]: ...
+
+
+#: From where a problem is searched: its initial state, its goal, or both in turn.
+SIDES = ("full", "empty", "both")
+
+
+@runtime_checkable
+class TwoSidedPlanner(Protocol):
+    """What the trait `either_side` claims: a complete planner that may search from the goal, or from both ends.
+
+    Where the problem cannot be reversed, it is searched from its initial state alone. Plans come out forwards.
+    """
+
+    def plan_from(
+        self,
+        problem: SearchProblem[Any],
+        scores: OrderScores | None = None,
+        *,
+        side: str,
+        budget: Budget | None = None,
+        rng: np.random.Generator | None = None,
+    ) -> PlanResult: ...
 
 
 @runtime_checkable

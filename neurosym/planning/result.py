@@ -64,6 +64,10 @@ class PlanResult:
             the paper's initial collapse. None when the search says nothing about it.
         fewest: whether it is proved that no plan has fewer actions; None where nobody asked.
         why_not: why the search could not go on, for a problem that can explain it and has no plan; else None.
+        side: from which side the search came to its end: "full", from the initial state; "empty", from the goal; "both"
+            where they met.
+        best_suffix: the longest verified end of an order, from the empty side: what can be undone of all that is done.
+            None where nothing was searched from there.
     """
 
     status: Status
@@ -79,6 +83,8 @@ class PlanResult:
     first_guess_failed: bool | None = None
     why_not: WhyNot | None = None
     fewest: bool | None = None
+    side: str = "full"
+    best_suffix: tuple[str, ...] | None = None
 
     def __post_init__(self) -> None:
         if (self.plan is not None) != (self.status is Status.SOLVED):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
@@ -21,24 +21,64 @@ S = TypeVar("S", bound=Hashable)
 MAX_BLAME = 10_000
 
 
-class SearchLog(Generic[S]):
-    """Counts, budget, evidence and best prefix of one search. Every attempt of a planner goes through it."""
+@dataclass
+class _Counts:
+    """What the two sides of one search count together."""
 
-    def __init__(self, problem: SearchProblem[S], budget: Budget | None = None) -> None:
+    attempts: int = 0
+    expansions: int = 0
+    iterations: int = 0
+    rejections: list[Rejection] = field(default_factory=list)  # the first `MAX_BLAME`
+    start: float = field(default_factory=perf_counter)
+
+
+class SearchLog(Generic[S]):
+    """Counts, budget, evidence and best prefix of one search. Every attempt of a planner goes through it.
+
+    Args:
+        beside: the log of a search of the same problem from its other end. Then `problem` is the reversed one; budget
+            and counts are shared, and results are told forwards.
+
+    Attributes:
+        side: "full" or, beside another log, "empty".
+        best_prefix: the longest order that was verified from this side.
+        refused: how many attempts were rejected from this side.
+        all_proved: whether all of them were certain.
+    """
+
+    def __init__(
+        self, problem: SearchProblem[S], budget: Budget | None = None, *, beside: SearchLog[Any] | None = None
+    ) -> None:
         self.problem = problem
         self.budget = budget or Budget()
-        self.attempts = 0
-        self.expansions = 0
-        self.iterations = 0
+        self.side = "full" if beside is None else "empty"
         self.best_prefix: tuple[int, ...] = ()
-        self.all_proved = True  # whether every rejection so far was certain
-        self.rejections: list[Rejection] = []  # the first `MAX_BLAME`
+        self.refused = 0
+        self.all_proved = True
+        self._counts: _Counts = _Counts() if beside is None else beside._counts
         self._names = tuple(problem.actions)
-        self._start = perf_counter()
+        self._other: SearchLog[Any] | None = beside
+        if beside is not None:
+            beside._other = self
+
+    @property
+    def attempts(self) -> int:
+        """Questions to the oracle."""
+        return self._counts.attempts
+
+    @property
+    def expansions(self) -> int:
+        """States whose candidates were generated."""
+        return self._counts.expansions
+
+    @property
+    def iterations(self) -> int:
+        """Rejections."""
+        return self._counts.iterations
 
     @property
     def seconds(self) -> float:
-        return perf_counter() - self._start
+        return perf_counter() - self._counts.start
 
     def out_of_budget(self) -> bool:
         """Whether a limit has been reached: ask before every attempt and every expansion."""
@@ -52,12 +92,12 @@ class SearchLog(Generic[S]):
 
     def candidates(self, state: S) -> Sequence[int]:
         """The candidates of `state`; counts one expansion."""
-        self.expansions += 1
+        self._counts.expansions += 1
         return tuple(self.problem.candidates(state))
 
     def attempt(self, prefix: tuple[int, ...], state: S, action: int) -> Step[S] | Rejection:
         """Ask the oracle for `action` after `prefix`, which led to `state`; counts one attempt."""
-        self.attempts += 1
+        self._counts.attempts += 1
         answer = self.problem.attempt(state, action)
         if isinstance(answer, Rejection):
             self._keep(prefix, action, answer)
@@ -70,10 +110,13 @@ class SearchLog(Generic[S]):
         self._keep(prefix, action, Rejection(reason))
 
     def _keep(self, prefix: tuple[int, ...], action: int, rejection: Rejection) -> None:
-        self.iterations += 1
+        counts = self._counts
+        counts.iterations += 1
+        self.refused += 1
         self.all_proved = self.all_proved and rejection.proved
-        if len(self.rejections) < MAX_BLAME:
-            self.rejections.append(replace(rejection, action=self._names[action], after=self.names(prefix)))
+        if len(counts.rejections) < MAX_BLAME:
+            after, name = self.names(prefix), self._names[action]
+            counts.rejections.append(replace(rejection, action=name, after=after, side=self.side))
 
     def names(self, actions: Sequence[int]) -> tuple[str, ...]:
         return tuple([self._names[a] for a in actions])
@@ -87,7 +130,7 @@ class SearchLog(Generic[S]):
         first_guess_failed: bool | None = None,
         fewest: bool | None = None,
     ) -> PlanResult:
-        """The result for a plan, given as indices of actions."""
+        """The result for a plan, given as indices of actions, forwards."""
         named, cost = Plan(self.names(plan), motions), None if scores is None else scores.plan_cost(plan)
         rest = {"motions": named.motions, "cost": cost, "fewest": fewest}
         return self._result(Status.SOLVED, named, tuple(named), first_guess_failed, **rest)
@@ -99,11 +142,16 @@ class SearchLog(Generic[S]):
         """
         if status is Status.UNSOLVABLE and not self.all_proved:
             status = Status.GAVE_UP
-        return self._result(status, None, self.names(self.best_prefix), first_guess_failed)
+        full = self if self.side == "full" else self._other
+        return self._result(status, None, self.names(full.best_prefix if full else ()), first_guess_failed)
 
     def _result(
         self, status: Status, plan: Plan | None, best_prefix: tuple[str, ...], failed: bool | None, **rest: Any
     ) -> PlanResult:
         counts = (self.iterations, self.expansions, self.attempts, self.seconds)
-        blame = tuple(self.rejections)
+        blame = tuple(self._counts.rejections)
+        empty = self if self.side == "empty" else self._other
+        if empty is not None:
+            rest |= {"best_suffix": self.names(empty.best_prefix[::-1])}
+        rest = {"side": self.side, **rest}
         return PlanResult(status, plan, *counts, best_prefix, blame, first_guess_failed=failed, **rest)

@@ -98,7 +98,7 @@ def _beyond(root: _Node, steps: int) -> float:
 def _tree(result: PlanResult) -> tuple[_Node, int]:
     """The tree of a search, and how many refusals are in it."""
     root = _Node(0)
-    shown = result.blame[:MOST_REFUSALS]
+    shown = [r for r in result.blame if r.side == "full"][:MOST_REFUSALS]
     names = [r.action for r in shown] + [a for r in shown for a in r.after] + list(result.plan or result.best_prefix)
     short = without_common(names)
     for refusal in shown:

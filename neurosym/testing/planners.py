@@ -20,6 +20,7 @@ from neurosym.planning.planner import KBestPlanner, Planner
 from neurosym.planning.result import PlanResult, Status
 from neurosym.planning.search_log import MAX_BLAME
 from neurosym.registry import load_planner
+from neurosym.testing.sides import check_sides
 from neurosym.testing.toys import NumberLine, Removal, Table, Tiles, brute_force_plans
 from neurosym.testing.wrapped import Counting, Relabelled, Unproved
 
@@ -108,6 +109,8 @@ def check_planner(planner: str | Planner, *, seeds: int = 12) -> None:
             if scores is not None and _costs_are_promised(toy, scores):
                 _check_optimality(made, toy, scores, result, where)
                 _check_k_best(made, toy, scores, where)
+            if made.traits.either_side:
+                check_sides(made, toy.problem, toy.plans, scores, where)
         _check_budgets(made, toy)
     _check_use_of_scores(made)
     _check_unproved(made, seeds)

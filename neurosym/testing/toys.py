@@ -127,6 +127,41 @@ class Removal:
         names = tuple(self.actions[p] for p in first)
         return Rejection("Blocked in every direction.", names, tuple(first) if self.promises else (), self.promises)
 
+    def reversed(self) -> Undone | None:
+        """The problem from its end, where all parts must go."""
+        return Undone(self) if self.target == (1 << len(self.blockers)) - 1 else None
+
+
+@dataclass(frozen=True)
+class Undone:
+    """A removal of all parts from its end: they come back, in the reverse order."""
+
+    removal: Removal
+
+    @property
+    def actions(self) -> tuple[str, ...]:
+        return self.removal.actions
+
+    @property
+    def classes(self) -> tuple[int, ...]:
+        return self.removal.classes
+
+    @property
+    def initial(self) -> int:
+        return self.removal.target
+
+    def is_goal(self, state: int) -> bool:
+        return state == self.removal.initial
+
+    def candidates(self, state: int) -> list[int]:
+        gone = [p for p in range(len(self.actions)) if state >> p & 1]
+        return [p for p in gone if p in self.removal.candidates(state & ~(1 << p))]
+
+    def attempt(self, state: int, action: int) -> Step[int] | Rejection:
+        before = state & ~(1 << action)
+        answer = self.removal.attempt(before, action)
+        return Step(before, answer.motion) if isinstance(answer, Step) else Rejection(answer.reason, answer.because)
+
 
 @dataclass(frozen=True)
 class Tiles:

@@ -50,7 +50,8 @@ class Query:
 class Search:
     """What a search knew and did: `steps` are its plan or the longest prefix that works, with a motion each, or none.
 
-    The refusals are in order; figures (`counts`), settings and reasons why there is no plan are for people to read.
+    `undone` is what can be undone from the goal at the most, of a search that ended there without a plan. The refusals
+    are in order; figures (`counts`), settings and reasons why there is no plan are for people to read.
     """
 
     steps: tuple[str, ...]
@@ -62,6 +63,7 @@ class Search:
     settings: str
     scores: OrderScores | None = None
     why_not: tuple[str, ...] = ()
+    undone: tuple[str, ...] | None = None
 
     @property
     def solved(self) -> bool:
@@ -81,7 +83,8 @@ class Search:
         motions = () if result.plan is None else result.motions
         settings = _settings(query.planner, query.prior, query.oracle)
         why_not = () if result.why_not is None else tuple(result.why_not.sentences)
-        return cls(steps, motions, result.status, sentence, result.blame, counts, settings, scores, why_not)
+        undone = result.best_suffix if result.side == "empty" and not result.solved else None
+        return cls(steps, motions, result.status, sentence, result.blame, counts, settings, scores, why_not, undone)
 
     @classmethod
     def saved(cls, saved: SavedPlan, scores: OrderScores | None) -> Search:
@@ -99,7 +102,8 @@ class Search:
             if not checked.ok:
                 status, sentence = Status.GAVE_UP, f"The file has a plan, but it does not hold. {checked.reason}"
         settings = _settings(*(saved.document.get(key) for key in ("planner", "prior", "oracle")))
-        evidence = (account.refusals, account.counts, settings, scores, account.why_not)
+        undone = account.best_suffix if saved.document.get("side") == "empty" and status is not Status.SOLVED else None
+        evidence = (account.refusals, account.counts, settings, scores, account.why_not, undone)
         return cls(saved.plan, saved.motions, status, sentence, *evidence)
 
 
@@ -119,6 +123,14 @@ class Exhibit:
     timeline: Timeline | None
     pictures: NDArray[np.uint8] | None
     notes: tuple[str, ...] = ()
+
+    @property
+    def buildable(self) -> tuple[str, ...] | None:
+        """The parts that are in place in the furthest state from the empty side, where that decided; else None."""
+        if self.timeline is None or self.search.undone is None:
+            return None
+        missing = set(self.problem.actions) - set(self.search.undone)
+        return tuple(name for name in self.timeline.names if name not in missing)
 
     @classmethod
     def of(cls, problem: Problem, search: Search, notes: tuple[str, ...] = ()) -> Exhibit:

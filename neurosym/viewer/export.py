@@ -54,7 +54,7 @@ def _film(exhibit: Exhibit) -> str:
     server = LocalServer()
     try:
         scene = PlanScene(server)
-        scene.put(timeline)
+        scene.put(timeline, exhibit.buildable)
         recording = server.get_scene_serializer()
         recording.insert_sleep(PAUSE)
         frames = round(timeline.n_steps * SECONDS_PER_STEP * RATE)

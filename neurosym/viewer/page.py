@@ -65,7 +65,7 @@ class Page:
             self.exhibit, self.playing = exhibit, False
             timeline, search = exhibit.timeline, exhibit.search
             n_steps, names = (timeline.n_steps, timeline.names) if timeline else (0, ())
-            self.scene.put(timeline)
+            self.scene.put(timeline, exhibit.buildable)
             self.slider.max = max(n_steps, 1)
             self.slider.disabled = self.play.disabled = n_steps == 0
             assign(self.slider, 0.0)
@@ -213,7 +213,7 @@ class Page:
             timeline = exhibit.timeline
             if timeline is None:
                 return
-            if exhibit.search.steps[: len(refusal.after)] == refusal.after:
+            if refusal.side == "full" and exhibit.search.steps[: len(refusal.after)] == refusal.after:
                 self._play(False)
                 assign(self.slider, float(len(refusal.after)))
             colours: dict[str, tuple[int, int, int] | None] = dict.fromkeys(refusal.because, BECAUSE)

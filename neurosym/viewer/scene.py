@@ -68,6 +68,7 @@ class PlanScene:
     def _clear(self, timeline: Timeline | None) -> None:
         """Nothing of a timeline is in the scene yet."""
         self.timeline = timeline
+        self._usual: Mapping[str, RGB | None] | None = None
         self.parts: list[viser.MeshHandle] = []
         self._names: list[viser.LabelHandle] = []
         self._outlines: dict[str, viser.LineSegmentsHandle] = {}
@@ -77,14 +78,20 @@ class PlanScene:
         self._standing_out: Mapping[str, RGB | None] | None = None
         self._held: frozenset[str] = frozenset()
 
-    def put(self, timeline: Timeline | None) -> None:
-        """Show another timeline from its beginning, or nothing."""
+    def put(self, timeline: Timeline | None, standing_out: Collection[str] | None = None) -> None:
+        """Show another timeline from its beginning, or nothing.
+
+        Args:
+            standing_out: names of the parts that are not faint while nothing else stands out; None: all.
+        """
         with self.server.atomic():
             self.server.scene.remove_by_name("/parts")
             self._clear(timeline)
             if timeline is not None:
                 self._add(timeline)
                 self.show(0.0)
+                self._usual = None if standing_out is None else dict.fromkeys(standing_out)
+                self.stand_out(None)
 
     def _add(self, timeline: Timeline) -> None:
         assembly = timeline.staging.assembly
@@ -194,7 +201,7 @@ class PlanScene:
 
     def stand_out(self, colours: Mapping[str, RGB | None] | None) -> None:
         """Let parts stand out, each in a colour (0..255) or, with None, its own, the others faint; None ends it."""
-        timeline = self.timeline
+        timeline, colours = self.timeline, self._usual if colours is None else colours
         if timeline is None or colours == self._standing_out:
             return
         self._standing_out = colours

@@ -92,6 +92,8 @@ def _none(exhibit: Exhibit) -> str:
     because = f"<p><b>Why nothing more can be done</b></p><ul>{reasons}</ul>" if reasons else ""
     if exhibit.search.refusals:
         because += "<p>The tab Search has each refused attempt; look at one to see it in the view.</p>"
+    if exhibit.buildable is not None:
+        because += "<p>Faint in the view is all that cannot be put in place from the empty side.</p>"
     rest = ": the longest prefix that works is shown." if exhibit.search.steps else ", and no step to show."
     return f"<p class='note'>No plan{rest}</p>{because}"
 
@@ -137,7 +139,7 @@ def attempts(search: Search, around: int = 0) -> str:
     on_path, done = search.steps, 0
     for number, refusal in enumerate(search.refusals[:end], 1):
         depth = len(refusal.after)
-        if on_path[:depth] == refusal.after:
+        if refusal.side == "full" and on_path[:depth] == refusal.after:
             kept = [_kept(i, on_path[i]) for i in range(done, depth)]
             rows.extend(kept if number > first else ())
             done = max(done, depth)
@@ -173,10 +175,12 @@ def _kept(step: int, action: str) -> str:
 
 def refused(number: int, refusal: Rejection) -> str:
     """One refused attempt, with its reason."""
-    after = escape(", ".join(refusal.after)) or "nothing"
+    after = f"after {escape(', '.join(refusal.after)) or 'nothing'}"
+    if refusal.side != "full":
+        after = f"from the empty side {after} was undone"
     return (
         f"<p style='margin:2px 0 2px 14px'><span style='color:#b04a00'>✘ {number}. not <b>{escape(refusal.action)}</b>"
-        f"</span> <span class='quiet'>after {after}</span><br>{escape(refusal.reason)}</p>"
+        f"</span> <span class='quiet'>{after}</span><br>{escape(refusal.reason)}</p>"
     )
 
 

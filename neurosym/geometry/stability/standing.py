@@ -7,6 +7,7 @@ in which gravity does work and no contact resists proves it: the evidence, and t
 `Equilibrium` decides most questions, and what it cannot prove a linear program decides. In a sequence of questions
 about similar subsets most answers are local, each proved by itself:
 
+* movable parts that hang together by no contacts stand or fall by themselves, and are judged and remembered so;
 * forces of a subset that stood may balance a smaller one as they are, or when only those near what left are changed;
 * parts that fall although all others were immovable fall in any case.
 """
@@ -127,6 +128,29 @@ class Stability:
 
     def _answer(self, subset: int, held: int) -> Standing:
         movable = subset & ~held & ~self.assembly.fixed_mask
+        moving = 0
+        for group in self.groups(movable):
+            around = functools.reduce(int.__or__, (self.touching[p] for p in bits(group)), 0) & subset & ~group
+            if group | around == subset:
+                return self._judge(subset, movable, held)
+            moving |= self.standing(group | around, around).moving
+        return Standing(not moving, moving, held)
+
+    def groups(self, movable: int) -> list[int]:
+        """Bitsets of movable parts that hang together by contacts."""
+        found = []
+        while movable:
+            group = fresh = movable & -movable
+            while fresh:
+                near = functools.reduce(int.__or__, (self.touching[p] for p in bits(fresh)), 0)
+                fresh = near & movable & ~group
+                group |= fresh
+            found.append(group)
+            movable &= ~group
+        return found
+
+    def _judge(self, subset: int, movable: int, held: int) -> Standing:
+        """The answer for movable parts that hang together, with all that touches them."""
         for known, moving in self._falls:
             if not moving & ~movable and not subset & ~known:
                 self.asked["kept"] += 1
