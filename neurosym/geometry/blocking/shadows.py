@@ -14,6 +14,7 @@ import shapely
 from neurosym.geometry.contact.surfaces import GRID, Surfaces
 from neurosym.geometry.mesh import kernels, trees
 from neurosym.geometry.mesh.broad_phase import MOST, near_pairs
+from neurosym.geometry.mesh.polygons import union
 from neurosym.support.arrays import Array, Numbers, Truths, bounds
 
 #: So many narrow pieces of an overlap are put together before the rest of them are looked for.
@@ -78,4 +79,4 @@ def _are_wide(pieces: Array, touch: float) -> bool:
         chosen[np.setdiff1d(np.arange(len(pieces)), other[crowded[one]])] = False
     # A little larger, so that neighbours overlap: what shares an edge to the last digit is where GEOS goes wrong.
     larger = shapely.buffer(shapely.polygons(pieces[chosen]), GRID, join_style="mitre")
-    return not shapely.union_all(larger).buffer(-0.5 - GRID).is_empty
+    return not union(larger, GRID / 16).buffer(-0.5 - GRID).is_empty

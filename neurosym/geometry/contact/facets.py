@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from neurosym.geometry.contact.planes import is_wide
 from neurosym.geometry.contact.surfaces import GRID, BodySurfaces
 from neurosym.geometry.mesh import kernels
+from neurosym.geometry.mesh.polygons import intersections
 from neurosym.geometry.mesh.triangles import plane_axes
 from neurosym.support.arrays import Array, Numbers
 
@@ -67,9 +68,8 @@ def facet_patches(
     row, uv = np.repeat(few, counts), corners[np.arange(corners.shape[1]) < counts[:, None]]
     many = np.flatnonzero(i >= m)
     if len(many):
-        # On a grid: with floating numbers GEOS may take two neighbours that share an edge for one and the same.
         seen = [flats.polygons(x[many] - m, origins[number[many]], axes[number[many]]) for x in (i, j)]
-        common = shapely.intersection(*seen, grid_size=GRID * touch)
+        common = intersections(seen[0], seen[1], GRID * touch)
         corners, place = shapely.get_coordinates(common, return_index=True)
         areas, uv = np.concatenate([areas, shapely.area(common)]), np.concatenate([uv, corners])
         row = np.concatenate([row, many[place]])

@@ -21,6 +21,7 @@ from neurosym.geometry.contact.surfaces import BodySurfaces
 from neurosym.geometry.mesh import kernels, trees
 from neurosym.geometry.mesh.broad_phase import overlapping_pairs, spans
 from neurosym.geometry.mesh.distances import are_inside, nearest
+from neurosym.geometry.mesh.polygons import intersections
 from neurosym.geometry.mesh.triangles import pierced, plane_axes
 from neurosym.support.arrays import Array, Numbers, Truths
 
@@ -207,7 +208,7 @@ class _Pairs:
         if len(large):
             origin, _, axes = self._planes(large, flats.normals, flats.middles)
             one, two = (flats.polygons(f, origin[:, 0], axes) for f in large[:, 1:].T)
-            common = shapely.intersection(one, two, grid_size=self.noise / 10)
+            common = intersections(one, two, self.noise / 10)
             pieces, row = shapely.get_parts(shapely.constrained_delaunay_triangles(common), return_index=True)
             uv = shapely.get_coordinates(shapely.centroid(pieces))
             found.append(self._halfway(large[row], uv, flats.normals, flats.middles))

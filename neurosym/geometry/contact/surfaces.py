@@ -14,8 +14,7 @@ from neurosym.geometry.mesh.distances import surface_gaps
 from neurosym.geometry.mesh.flats import Flats
 from neurosym.support.arrays import Array, Numbers, Truths
 
-#: Polygons are clipped on a grid of this share of the touching tolerance: with floating numbers GEOS may take two
-#: neighbours that share an edge for one and the same (seen with shapely 2 at coordinates of 1e-3).
+#: Polygons are clipped on a grid of this share of the touching tolerance.
 GRID = 1e-3
 
 #: Corners of a flat face lie in its plane to this share of the smallest extent: 32-bit numbers have steps of 1e-7.
