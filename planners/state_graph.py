@@ -101,6 +101,8 @@ def count_orders(problem: SearchProblem[Any], *, budget: Budget | None = None) -
                 return OrderCount(None, False, states, log.seconds)
             for action in actions:
                 answer = log.attempt((), state, action)
+                if log.timed_out:
+                    return OrderCount(None, False, states, log.seconds)
                 if isinstance(answer, Step):
                     key = answer.state, used | 1 << action
                     below[key] = below.get(key, 0) + count

@@ -11,6 +11,7 @@ from neurosym.language.search_problem import Rejection, SearchProblem, Step
 from neurosym.planning.budget import Budget
 from neurosym.planning.order_scores import OrderScores
 from neurosym.planning.result import Plan, PlanResult, Status
+from neurosym.support.deadline import OutOfTime, within
 
 if TYPE_CHECKING:
     from neurosym.geometry.step_motion import StepMotion
@@ -31,6 +32,7 @@ class SearchLog(Generic[S]):
         self.expansions = 0
         self.iterations = 0
         self.best_prefix: tuple[int, ...] = ()
+        self.timed_out = False  # whether an answer was cut short
         self.all_proved = True  # whether every rejection so far was certain
         self.rejections: list[Rejection] = []  # the first `MAX_BLAME`
         self._names = tuple(problem.actions)
@@ -40,25 +42,43 @@ class SearchLog(Generic[S]):
     def seconds(self) -> float:
         return perf_counter() - self._start
 
+    @property
+    def _left(self) -> float | None:
+        return None if self.budget.seconds is None else self.budget.seconds - self.seconds
+
     def out_of_budget(self) -> bool:
         """Whether a limit has been reached: ask before every attempt and every expansion."""
         b = self.budget
         return (
-            (b.attempts is not None and self.attempts >= b.attempts)
+            self.timed_out
+            or (b.attempts is not None and self.attempts >= b.attempts)
             or (b.expansions is not None and self.expansions >= b.expansions)
             or (b.seconds is not None and self.seconds >= b.seconds)
             or (b.watch is not None and b.watch(self))
         )
 
     def candidates(self, state: S) -> Sequence[int]:
-        """The candidates of `state`; counts one expansion."""
+        """The candidates of `state`, none where the time ends meanwhile; counts one expansion."""
         self.expansions += 1
-        return tuple(self.problem.candidates(state))
+        try:
+            with within(self._left):
+                return tuple(self.problem.candidates(state))
+        except OutOfTime:
+            self.timed_out = True
+            return ()
 
     def attempt(self, prefix: tuple[int, ...], state: S, action: int) -> Step[S] | Rejection:
-        """Ask the oracle for `action` after `prefix`, which led to `state`; counts one attempt."""
+        """Ask the oracle for `action` after `prefix`, which led to `state`; counts one attempt.
+
+        Where the time ends meanwhile, the answer is a rejection that promises nothing, and the budget is spent.
+        """
         self.attempts += 1
-        answer = self.problem.attempt(state, action)
+        try:
+            with within(self._left):
+                answer = self.problem.attempt(state, action)
+        except OutOfTime:
+            self.timed_out = True
+            return Rejection("The time ended before there was an answer.", proved=False)
         if isinstance(answer, Rejection):
             self._keep(prefix, action, answer)
         elif len(prefix) >= len(self.best_prefix):
@@ -95,8 +115,11 @@ class SearchLog(Generic[S]):
     def failed(self, status: Status, *, first_guess_failed: bool | None = None) -> PlanResult:
         """The result for a search that ended without a plan.
 
-        What was rejected without proof leaves nothing proved: UNSOLVABLE then becomes GAVE_UP.
+        What was rejected without proof leaves nothing proved: UNSOLVABLE then becomes GAVE_UP. Where the time cut an
+        answer short, the budget ended the search, whatever the planner made of it.
         """
+        if self.timed_out:
+            status = Status.OUT_OF_BUDGET
         if status is Status.UNSOLVABLE and not self.all_proved:
             status = Status.GAVE_UP
         return self._result(status, None, self.names(self.best_prefix), first_guess_failed)

@@ -17,13 +17,14 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from neurosym.geometry.contact.surfaces import BodySurfaces
+from neurosym.geometry.contact.surfaces import FACETS, BodySurfaces
 from neurosym.geometry.mesh import kernels, trees
 from neurosym.geometry.mesh.broad_phase import overlapping_pairs, spans
 from neurosym.geometry.mesh.distances import are_inside, nearest
 from neurosym.geometry.mesh.polygons import intersections
 from neurosym.geometry.mesh.triangles import pierced, plane_axes
 from neurosym.support.arrays import Array, Numbers, Truths
+from neurosym.support.deadline import portions
 
 #: Points (n, 3), and the pair of bodies that each is meant for, int64 (n,).
 Points = tuple[Array, Numbers]
@@ -67,15 +68,16 @@ def overlaps(surfaces: BodySurfaces, fixed: int = 0) -> list[Overlap]:
     # point faces are compared.
     near = surfaces.exact.gaps(pairs, enough=noise, far=2 * noise) <= noise
     overlap = np.zeros(len(pairs), dtype=bool)
-    overlap[near] = _Pairs(surfaces, pairs[near], noise).overlapping()
+    touching = np.flatnonzero(near)
+    for rows in portions(np.diff(surfaces.exact.first)[pairs[touching]].sum(axis=1), FACETS):
+        overlap[touching[rows]] = _Pairs(surfaces, pairs[touching[rows]], noise).overlapping()
     overlap[~near] = _Pairs(surfaces, pairs[~near], noise).contained()
     pairs = pairs[overlap]
     count = np.diff(surfaces.exact.first)[pairs].prod(axis=1)
     depths = [np.zeros(0)]
-    for rows in np.split(np.arange(len(pairs)), np.flatnonzero(np.diff(np.cumsum(count) // _AT_A_TIME)) + 1):
-        if len(rows):
-            some = _Pairs(surfaces, pairs[rows], noise)
-            depths.append(some.depths(np.where(count[rows] <= DENSE, whole, far)))
+    for rows in portions(count, _AT_A_TIME):
+        some = _Pairs(surfaces, pairs[rows], noise)
+        depths.append(some.depths(np.where(count[rows] <= DENSE, whole, far)))
     deep = zip(pairs.tolist(), np.concatenate(depths).tolist())
     return [Overlap(a, b, depth) for (a, b), depth in deep if depth > noise]
 
