@@ -1,6 +1,9 @@
 """Budgets hold inside geometry: what is cut short says so, promises nothing, and is asked again when there is time."""
 
 import itertools
+import signal
+import subprocess
+import sys
 import time
 
 import numpy as np
@@ -10,9 +13,11 @@ import trimesh
 import neurosym as ns
 from neurosym import pipeline
 from neurosym.cli import main
+from neurosym.commands.exit_codes import INTERRUPTED
 from neurosym.language.search_problem import Rejection
 from neurosym.planning.search_log import SearchLog
 from neurosym.support.deadline import OutOfTime, check, portions, remaining, within
+from neurosym.support.progress import heard_by
 from neurosym.testing.toys import NumberLine
 
 FAMILY = ns.load_domain("assembly")
@@ -28,12 +33,17 @@ def tori(count: int = 3, sections: int = 24) -> ns.Assembly:
     return ns.Assembly.from_meshes(meshes, units="mm")
 
 
+def shell_mesh(radius: float, *, inward: bool = False) -> trimesh.Trimesh:
+    mesh = trimesh.creation.icosphere(subdivisions=3, radius=radius)
+    if inward:
+        mesh.invert()
+    return mesh
+
+
 def shell() -> ns.Assembly:
     """A ball with room to move in a hollow one, and no way out."""
-    outer, inner = (trimesh.creation.icosphere(subdivisions=3, radius=r) for r in (10, 8))
-    inner.invert()
-    ball = trimesh.creation.icosphere(subdivisions=3, radius=5)
-    return ns.Assembly.from_meshes({"shell": trimesh.util.concatenate([outer, inner]), "ball": ball}, units="mm")
+    hollow = trimesh.util.concatenate([shell_mesh(10), shell_mesh(8, inward=True)])
+    return ns.Assembly.from_meshes({"shell": hollow, "ball": shell_mesh(5)}, units="mm")
 
 
 def grid(side: int) -> ns.Assembly:
@@ -172,3 +182,30 @@ def test_the_command_counts_reading_too(tmp_path, capsys):
         main(["plan", str(tmp_path), "--units", "mm", "--seconds", "0"])
     assert left.value.code == ns.Status.OUT_OF_BUDGET.exit_code
     assert "--seconds" in capsys.readouterr().err
+
+
+def test_geometry_tells_whoever_listens_how_far_it_is():
+    told = []
+    with heard_by(lambda *given: told.append(given)):
+        assembly = tori()
+        geometry = ns.AssemblyGeometry(assembly)
+        geometry.contacts, geometry.blocking(9).by_part
+    geometry.blocking(8).by_part  # noqa: B018
+    assert {what for what, *_ in told} >= {"contacts", "blocking", ""}
+    assert [(done, total) for what, done, total in told if what == "blocking"] == [(k, 9) for k in range(9)]
+    assert told[-1] == ("", 0, 0)
+
+
+def test_an_interrupted_plan_ends_cleanly(tmp_path):
+    for k, name in enumerate(("outer", "ball")):
+        mesh = trimesh.util.concatenate([shell_mesh(10), shell_mesh(8, inward=True)]) if not k else shell_mesh(5)
+        mesh.export(tmp_path / f"{name}.stl")
+    options = ["--units", "mm", "--paths", "any", "--no-gravity"]
+    run = subprocess.Popen(
+        [sys.executable, "-m", "neurosym.cli", "plan", str(tmp_path), *options], stderr=subprocess.PIPE, text=True
+    )
+    time.sleep(8)
+    assert run.poll() is None, run.stderr.read()
+    run.send_signal(signal.SIGINT)
+    said = run.communicate(timeout=60)[1]
+    assert (run.returncode, "Traceback" in said) == (INTERRUPTED, False)

@@ -20,6 +20,7 @@ from neurosym.commands.common import (
     load_assembly,
     print_json,
     problem_options,
+    progress_bar,
     say,
     write_json,
 )
@@ -119,20 +120,21 @@ def plan(
     }
     settings["budget"] = budget.less(perf_counter() - start)
     sturdiest: SturdyPlan | None = None
-    if sturdy:
-        if path is None or k is not None or removal.tilt is not None:
-            raise InputError("Expected --sturdy with the path of an assembly, and without --k and --tilt.")
-        sturdiest = sturdiest_plan(
-            lambda tilt: made(family.problem, assembly, options=named | {"tilt": tilt}, whose=family.name),
-            lambda tilted: solve(tilted, rng=np.random.default_rng(search.seed), **settings),
-        )
-        results, options = [sturdiest.result], options | {"tilt": sturdiest.bears}
-    else:
-        results = plans(problem, k=k, rng=np.random.default_rng(search.seed), **settings)
-    if not results:
-        # The k best of none: ask for one, to be told why there is none.
-        settings["budget"] = budget.less(perf_counter() - start)
-        results = [solve(problem, rng=np.random.default_rng(search.seed), **settings)]
+    if sturdy and (path is None or k is not None or removal.tilt is not None):
+        raise InputError("Expected --sturdy with the path of an assembly, and without --k and --tilt.")
+    with progress_bar(f"planning {problem.name}", after=1.0):
+        if sturdy:
+            sturdiest = sturdiest_plan(
+                lambda tilt: made(family.problem, assembly, options=named | {"tilt": tilt}, whose=family.name),
+                lambda tilted: solve(tilted, rng=np.random.default_rng(search.seed), **settings),
+            )
+            results, options = [sturdiest.result], options | {"tilt": sturdiest.bears}
+        else:
+            results = plans(problem, k=k, rng=np.random.default_rng(search.seed), **settings)
+        if not results:
+            # The k best of none: ask for one, to be told why there is none.
+            settings["budget"] = budget.less(perf_counter() - start)
+            results = [solve(problem, rng=np.random.default_rng(search.seed), **settings)]
     answer = {
         **problem_part(family.name, problem, number, options),
         **source,

@@ -14,6 +14,7 @@ from time import perf_counter
 import numpy as np
 
 from neurosym.support.arrays import Array, Numbers
+from neurosym.support.progress import tell
 
 _ends: ContextVar[float] = ContextVar("_ends", default=math.inf)
 
@@ -50,12 +51,20 @@ def check() -> None:
         raise OutOfTime
 
 
-def portions(weights: Array | Numbers, most: float) -> Iterator[slice]:
-    """Runs of rows whose weights (n,) sum to `most` or less, or one row; the deadline is looked at before each."""
+def portions(weights: Array | Numbers, most: float, what: str = "") -> Iterator[slice]:
+    """Runs of rows whose weights (n,) sum to `most` or less, or one row; the deadline is looked at before each.
+
+    Args:
+        what: is being done to the rows, for whoever listens to progress; "" tells nobody.
+    """
     ends = np.cumsum(weights)
     start, before = 0, 0.0
     while start < len(ends):
         check()
+        if what:
+            tell(what, start, len(ends))
         end = max(int(np.searchsorted(ends, before + most, side="right")), start + 1)
         yield slice(start, end)
         start, before = end, ends[end - 1]
+    if what:
+        tell()

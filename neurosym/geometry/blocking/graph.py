@@ -18,6 +18,7 @@ from neurosym.geometry.step_motion import Vector
 from neurosym.support.arrays import Array
 from neurosym.support.bitsets import bits, bitsets
 from neurosym.support.deadline import check
+from neurosym.support.progress import tell
 from neurosym.support.words import in_words
 
 
@@ -46,9 +47,11 @@ class BlockingGraph:
         along: list[Hits] = []
         for d, direction in enumerate(self.directions):
             check()
+            tell("blocking", d, len(self.directions))
             opposite = np.flatnonzero(np.linalg.norm(self.directions[:d] + direction, axis=1) < 1e-12)
             # What hits what going one way is hit by it going the other.
             along.append(along[opposite[0]].reversed() if len(opposite) else self.sweeps.along(direction))
+        tell()
         return along
 
     @cached_property

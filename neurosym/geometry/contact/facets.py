@@ -43,7 +43,7 @@ def facet_patches(
     small = exact.facing_trees(~is_flat, 2 * gap, sine)
     flat = exact.facing_trees(is_flat, 2 * gap, sine) if is_flat.any() else small
     near = []
-    for some in portions(np.diff(exact.first)[pairs].sum(axis=1), FACETS):
+    for some in portions(np.diff(exact.first)[pairs].sum(axis=1), FACETS, "contacts"):
         for one, two in ((small, small), (small, flat), (flat, small))[: 3 if is_flat.any() else 1]:
             found = kernels.facing_pairs(*one, *two, exact.normals, exact.first, pairs[some], within[some], sine)
             near.append(np.add(found, (some.start, 0, 0)))

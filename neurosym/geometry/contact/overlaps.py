@@ -43,6 +43,8 @@ DENSE, FAR = 100_000, 0.1
 #: So many pairs of faces are compared at a time.
 _AT_A_TIME = 1_000_000
 
+_WHAT = "overlaps at rest"
+
 
 @dataclass(frozen=True)
 class Overlap:
@@ -69,13 +71,13 @@ def overlaps(surfaces: BodySurfaces, fixed: int = 0) -> list[Overlap]:
     near = surfaces.exact.gaps(pairs, enough=noise, far=2 * noise) <= noise
     overlap = np.zeros(len(pairs), dtype=bool)
     touching = np.flatnonzero(near)
-    for rows in portions(np.diff(surfaces.exact.first)[pairs[touching]].sum(axis=1), FACETS):
+    for rows in portions(np.diff(surfaces.exact.first)[pairs[touching]].sum(axis=1), FACETS, _WHAT):
         overlap[touching[rows]] = _Pairs(surfaces, pairs[touching[rows]], noise).overlapping()
     overlap[~near] = _Pairs(surfaces, pairs[~near], noise).contained()
     pairs = pairs[overlap]
     count = np.diff(surfaces.exact.first)[pairs].prod(axis=1)
     depths = [np.zeros(0)]
-    for rows in portions(count, _AT_A_TIME):
+    for rows in portions(count, _AT_A_TIME, _WHAT):
         some = _Pairs(surfaces, pairs[rows], noise)
         depths.append(some.depths(np.where(count[rows] <= DENSE, whole, far)))
     deep = zip(pairs.tolist(), np.concatenate(depths).tolist())
