@@ -129,7 +129,8 @@ def search_and_check(
                     with open_oracle(problem, oracle) as fresh:
                         confirm(planner, result.plan, replay(fresh, result.plan))
             except OutOfTime:
-                return results[:i] or [replace(result, status=Status.OUT_OF_BUDGET, plan=None, motions=(), cost=None)]
+                nothing: dict[str, Any] = {"plan": None, "motions": (), "cost": None, "fewest": None}
+                return results[:i] or [replace(result, status=Status.OUT_OF_BUDGET, **nothing)]
     return results
 
 
