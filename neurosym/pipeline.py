@@ -23,6 +23,10 @@ from neurosym.planning.prior import Prior
 from neurosym.planning.result import OrderCount, PlanResult, Status
 from neurosym.planning.validation import confirm, replay, validate
 from neurosym.registry import load_planner, load_prior
+from neurosym.support.deadline import OutOfTime, within
+
+#: Seconds beyond the budget for looking over what came out of it: a plan's replay, or why there is none.
+GRACE = 0.5
 
 ORACLES = ("geometry", "physics")
 Advice = str | Path | Prior | OrderScores | None
@@ -44,7 +48,8 @@ def solve(
         problem: made by a domain, for instance ``ns.load_domain("soma").problem(17)``.
         planner: a name or a planner; None: the one that suits the problem, most often backtracking.
         prior: a name, a weights file, a prior, its scores, or None.
-        budget: when to stop.
+        budget: when to stop. Its seconds hold for all of this, geometry included. Looking over what came out may take
+            `GRACE` longer; a plan that is not replayed by then is the best prefix of a result without one.
         rng: a generator or a seed; the same seed gives the same answer.
         oracle: what answers attempts: ``"geometry"``, or ``"physics"``, a simulation in the loop.
         side: from where to search: ``"full"``, the initial state; ``"empty"``, the goal; or ``"both"`` in turn, where
@@ -78,15 +83,23 @@ def plans(
     searcher = load_planner(planner)
     generator = guarded(problem, searcher, k, budget, rng)
     side = side_of(problem, searcher, side, alone=k is None and oracle == "geometry")
-    scores = advice(problem, prior)
-    by_geometry, start = oracle == "geometry", time.perf_counter()
-    if by_geometry and (why_not := problem.semantics.refute(problem)) is not None:
-        none = PlanResult(Status.UNSOLVABLE, None, 0, 0, 0, time.perf_counter() - start, why_not=why_not)
-        return [none] if k is None else []
-    with open_oracle(problem, oracle) as search:
-        asked: dict[str, Any] = {"k": k, "budget": budget, "rng": generator, "oracle": oracle, "side": side}
-        results = search_and_check(problem, search, searcher, scores, **asked)
-    return [_explained(problem, result) for result in results] if by_geometry else results
+    budget, by_geometry, start = budget or Budget(), oracle == "geometry", time.perf_counter()
+
+    def spent() -> float:
+        return time.perf_counter() - start
+
+    try:
+        with within(_with_grace(budget)):
+            scores = advice(problem, prior)
+            if by_geometry and (why_not := problem.semantics.refute(problem)) is not None:
+                none = PlanResult(Status.UNSOLVABLE, None, 0, 0, 0, spent(), why_not=why_not)
+                return [none] if k is None else []
+            with open_oracle(problem, oracle) as search:
+                asked: dict[str, Any] = {"k": k, "budget": budget.less(spent()), "rng": generator, "oracle": oracle}
+                results = search_and_check(problem, search, searcher, scores, side=side, **asked)
+            return [_explained(problem, result) for result in results] if by_geometry else results
+    except OutOfTime:
+        return [PlanResult(Status.OUT_OF_BUDGET, None, 0, 0, 0, spent())] if k is None else []
 
 
 def search_and_check(
@@ -103,23 +116,34 @@ def search_and_check(
 ) -> list[PlanResult]:
     """One planner's results on an opened oracle (with k the k best plans, else one result), each plan replayed.
 
+    Where the time ends during a replay, those plans are left out, and the first result says so if none is left.
+
     Raises:
         ContractError: a plan does not survive its replay.
     """
-    if k is not None and isinstance(planner, KBestPlanner):
-        results = planner.plans(search, scores, k=k, budget=budget, rng=rng)
-    elif side != "full" and isinstance(planner, TwoSidedPlanner):
-        results = [planner.plan_from(search, scores, side=side, budget=budget, rng=rng)]
-    else:
-        results = [planner.plan(search, scores, budget=budget, rng=rng)]
-    results = [_bounded(search, result) for result in results]
-    for result in results:
-        if result.plan is not None and oracle == "geometry":
-            confirm(planner, result.plan, validate(problem, result.plan, result.motions))
-        elif result.plan is not None:
-            with open_oracle(problem, oracle) as fresh:
-                confirm(planner, result.plan, replay(fresh, result.plan))
+    with within(_with_grace(budget)):
+        if k is not None and isinstance(planner, KBestPlanner):
+            results = planner.plans(search, scores, k=k, budget=budget, rng=rng)
+        elif side != "full" and isinstance(planner, TwoSidedPlanner):
+            results = [planner.plan_from(search, scores, side=side, budget=budget, rng=rng)]
+        else:
+            results = [planner.plan(search, scores, budget=budget, rng=rng)]
+        results = [_bounded(search, result) for result in results]
+        for i, result in enumerate(results):
+            try:
+                if result.plan is not None and oracle == "geometry":
+                    confirm(planner, result.plan, validate(problem, result.plan, result.motions))
+                elif result.plan is not None:
+                    with open_oracle(problem, oracle) as fresh:
+                        confirm(planner, result.plan, replay(fresh, result.plan))
+            except OutOfTime:
+                nothing: dict[str, Any] = {"plan": None, "motions": (), "cost": None, "fewest": None}
+                return results[:i] or [replace(result, status=Status.OUT_OF_BUDGET, **nothing)]
     return results
+
+
+def _with_grace(budget: Budget | None) -> float | None:
+    return None if budget is None or budget.seconds is None else budget.seconds + GRACE
 
 
 def _bounded(search: SearchProblem[Any], result: PlanResult) -> PlanResult:
@@ -167,10 +191,15 @@ def count_plans(problem: Problem) -> int:
 
 def count_orders(problem: Problem, *, budget: Budget | None = None) -> OrderCount:
     """The same within a budget, whose end is a result: no number. A problem that is refuted at once has none."""
-    start = time.perf_counter()
-    if problem.semantics.refute(problem) is not None:
-        return OrderCount(0, True, 0, time.perf_counter() - start)
-    return _counter().count_orders(problem.ground(), budget=budget)
+    budget, start = budget or Budget(), time.perf_counter()
+    try:
+        with within(_with_grace(budget)):
+            if problem.semantics.refute(problem) is not None:
+                return OrderCount(0, True, 0, time.perf_counter() - start)
+            search = problem.ground()
+            return _counter().count_orders(search, budget=budget.less(time.perf_counter() - start))
+    except OutOfTime:
+        return OrderCount(None, False, 0, time.perf_counter() - start)
 
 
 def _counter() -> OrderCounter:
@@ -183,6 +212,9 @@ def _explained(problem: Problem, result: PlanResult) -> PlanResult:
     """The result with why there is no plan, where the problem can tell. A budget that ended says nothing of it."""
     if result.status in (Status.SOLVED, Status.OUT_OF_BUDGET):
         return result
-    if result.side == "empty":
-        return replace(result, why_not=problem.semantics.explain_from_goal(problem, result.best_suffix or ()))
-    return replace(result, why_not=problem.semantics.explain(problem, result.best_prefix))
+    try:
+        if result.side == "empty":
+            return replace(result, why_not=problem.semantics.explain_from_goal(problem, result.best_suffix or ()))
+        return replace(result, why_not=problem.semantics.explain(problem, result.best_prefix))
+    except OutOfTime:
+        return result

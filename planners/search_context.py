@@ -81,7 +81,10 @@ class SearchContext:
         """
         self.check_budget()
         first: dict[int, int] = {}
-        for action in sorted(self.log.candidates(state)):
+        candidates = sorted(self.log.candidates(state))
+        if self.log.timed_out:
+            raise BudgetSpent
+        for action in candidates:
             if not used >> action & 1:
                 first.setdefault(self.classes[action], action)
         return list(first.values())
@@ -91,7 +94,10 @@ class SearchContext:
         answer = self._answers.get((node.state, action))
         if answer is None:
             self.check_budget()
-            answer = self._answers[node.state, action] = self.log.attempt(node.prefix(), node.state, action)
+            answer = self.log.attempt(node.prefix(), node.state, action)
+            if self.log.timed_out:
+                raise BudgetSpent
+            self._answers[node.state, action] = answer
         return answer
 
     def learn(self, node: Node, action: int, rejection: Rejection) -> None:

@@ -137,6 +137,8 @@ def _next_layer(context: SearchContext, layer: dict[tuple[Any, int], int]) -> di
         node = Node(state, used)
         for action in context.nogoods.allowed(node, context.expand(state, used)):
             answer = context.log.attempt((), state, action)
+            if context.log.timed_out:
+                raise BudgetSpent
             if isinstance(answer, Step):
                 key = answer.state, used | 1 << action
                 below[key] = below.get(key, 0) + count

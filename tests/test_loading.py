@@ -573,11 +573,12 @@ def test_closed_shells_of_one_mesh_are_parts_and_a_shell_inside_is_a_cavity(endi
     assert (note.measure, f"'{name}-1' to '{name}-4'" in note.sentence) == (4, True)
 
 
-def test_hundreds_of_solids_far_apart_are_as_many_parts(tmp_path: Path):
-    mesh(many(*(box(at=(3 * i, 0, 0)) for i in range(300)))).export(tmp_path / "a.stl")
-    assembly = ns.Assembly.load(tmp_path / "a.stl", units="m")
-    assert assembly.names == tuple(f"a-{k + 1}" for k in range(300))
-    np.testing.assert_allclose(assembly.bodies.part_bounds[:, 0, 0], 3 * np.arange(300) - 0.5)
+@pytest.mark.parametrize("ending", ["stl", "obj", "ply"])
+def test_thousands_of_solids_far_apart_are_as_many_parts(tmp_path: Path, ending):
+    mesh(many(*(box(at=(3 * i, 0, 0)) for i in range(2_000)))).export(tmp_path / f"a.{ending}")
+    assembly = ns.Assembly.load(tmp_path / f"a.{ending}", units="m")
+    assert [name.rpartition("-")[2] for name in assembly.names] == [str(k + 1) for k in range(2_000)]
+    np.testing.assert_allclose(assembly.bodies.part_bounds[:, 0, 0], 3 * np.arange(2_000) - 0.5, atol=1e-3)
 
 
 def body_mesh(assembly: ns.Assembly, part: int) -> tuple[np.ndarray, np.ndarray]:

@@ -18,7 +18,7 @@ from neurosym.errors import InputError
 from neurosym.language.options import read_options
 from neurosym.language.problem_family import ProblemFamily, Progress
 from neurosym.support.files import write_text
-from neurosym.support.progress import silent
+from neurosym.support.progress import heard_by, silent
 
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
@@ -278,8 +278,13 @@ def progress_bar(what: str, after: float = 0.0) -> Iterator[Progress]:
     task = bars.add_task(what, total=None)
     start = Timer(after, bars.start)
     start.start()
+
+    def heard(doing: str, done: int, total: int) -> None:
+        bars.update(task, completed=done, total=total or None, description=f"{what}: {doing}" if doing else what)
+
     try:
-        yield lambda done, total: bars.update(task, completed=done, total=total)
+        with heard_by(heard):
+            yield lambda done, total: bars.update(task, completed=done, total=total)
     finally:
         start.cancel()
         start.join()

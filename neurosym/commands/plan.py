@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from time import perf_counter
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
@@ -19,12 +20,15 @@ from neurosym.commands.common import (
     load_assembly,
     print_json,
     problem_options,
+    progress_bar,
+    say,
     write_json,
 )
 from neurosym.errors import InputError
 from neurosym.language.options import made
 from neurosym.language.problem_family import ProblemFamily
 from neurosym.plan_files.writing import problem_part, result_part
+from neurosym.support.deadline import OutOfTime, within
 from neurosym.support.words import joined
 
 if TYPE_CHECKING:
@@ -84,9 +88,11 @@ def plan(
     from neurosym.geometry.readers.references import reference
     from neurosym.pipeline import plans, solve
     from neurosym.planning.budget import Budget
+    from neurosym.planning.result import Status
     from neurosym.planning.sturdiness import SturdyPlan, sturdiest_plan
     from neurosym.registry import load_domain
 
+    start = perf_counter()
     cells = search.own_cells()
     path = _path(what, number, cells)
     family = load_domain("assembly" if path else what)
@@ -100,9 +106,14 @@ def plan(
         # Pieces of the user's own travel with their plan, so that it can be shown and replayed.
         source = {} if cells is None else {"cells": cells}
     else:
-        assembly = load_assembly(path, files)
-        named = options | {"name": path.resolve().name}
-        problem = made(family.problem, assembly, options=named, whose=family.name)
+        try:
+            with within(search.seconds):
+                assembly = load_assembly(path, files)
+                named = options | {"name": path.resolve().name}
+                problem = made(family.problem, assembly, options=named, whose=family.name)
+        except OutOfTime:
+            say(f"The budget of {search.seconds:g} seconds ended while {path} was read. Give more: --seconds.")
+            raise typer.Exit(Status.OUT_OF_BUDGET.exit_code) from None
         source = {"assembly": reference(path, files.reading(), assembly)}
         options = options | {"stability": problem.details["stability"]}
     prior = search.prior
@@ -116,20 +127,23 @@ def plan(
         "oracle": search.oracle,
         "side": side,
     }
+    settings["budget"] = budget.less(perf_counter() - start)
     sturdiest: SturdyPlan | None = None
-    if sturdy:
-        if path is None or k is not None or removal.tilt is not None:
-            raise InputError("Expected --sturdy with the path of an assembly, and without --k and --tilt.")
-        sturdiest = sturdiest_plan(
-            lambda tilt: made(family.problem, assembly, options=named | {"tilt": tilt}, whose=family.name),
-            lambda tilted: solve(tilted, rng=np.random.default_rng(search.seed), **settings),
-        )
-        results, options = [sturdiest.result], options | {"tilt": sturdiest.bears}
-    else:
-        results = plans(problem, k=k, rng=np.random.default_rng(search.seed), **settings)
-    if not results:
-        # The k best of none: ask for one, to be told why there is none.
-        results = [solve(problem, rng=np.random.default_rng(search.seed), **settings)]
+    if sturdy and (path is None or k is not None or removal.tilt is not None):
+        raise InputError("Expected --sturdy with the path of an assembly, and without --k and --tilt.")
+    with progress_bar(f"planning {problem.name}", after=1.0):
+        if sturdy:
+            sturdiest = sturdiest_plan(
+                lambda tilt: made(family.problem, assembly, options=named | {"tilt": tilt}, whose=family.name),
+                lambda tilted: solve(tilted, rng=np.random.default_rng(search.seed), **settings),
+            )
+            results, options = [sturdiest.result], options | {"tilt": sturdiest.bears}
+        else:
+            results = plans(problem, k=k, rng=np.random.default_rng(search.seed), **settings)
+        if not results:
+            # The k best of none: ask for one, to be told why there is none.
+            settings["budget"] = budget.less(perf_counter() - start)
+            results = [solve(problem, rng=np.random.default_rng(search.seed), **settings)]
     answer = {
         **problem_part(family.name, problem, number, options),
         **source,

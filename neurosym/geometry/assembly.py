@@ -8,6 +8,7 @@ asked of `neurosym.geometry.queries.AssemblyGeometry`.
 from __future__ import annotations
 
 import importlib
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -66,7 +67,7 @@ class Assembly:
         names = [p.name for p in self.parts]
         if not names:
             raise AssemblyError("Expected at least one part; got none.")
-        twice = sorted({n for n in names if names.count(n) > 1})
+        twice = sorted(n for n, count in Counter(names).items() if count > 1)
         if twice:
             raise AssemblyError(f"Expected each part name once; got twice: {', '.join(twice)}. Rename one.")
         if not (isinstance(self.friction, int | float | np.number) and 0.0 <= self.friction < np.inf):

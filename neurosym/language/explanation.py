@@ -12,6 +12,7 @@ from typing import Any
 from neurosym.geometry.blocking.graph import BlockingGraph
 from neurosym.geometry.step_motion import GROUND, Vector
 from neurosym.support.bitsets import bits
+from neurosym.support.deadline import check
 from neurosym.support.words import LISTED, in_words, listed
 
 
@@ -166,11 +167,13 @@ def smallest_cycle(graph: BlockingGraph, there: int) -> Cycle | None:
 def _shortest(along: Sequence[int], there: int, below: int) -> tuple[int, ...]:
     """The shortest cycle with fewer than `below` nodes in a graph of bitsets of successors; empty: none."""
     for i in bits(there):
+        check()
         for j in bits(along[i]):
             if along[j] >> i & 1:
                 return (i, j) if below > 2 else ()
     best: tuple[int, ...] = ()
     for start in bits(there):
+        check()
         parent = {start: -1}
         layer, seen, length = [start], 1 << start, 1  # parts on a path from the start to one of this layer
         while layer and length < below:

@@ -197,12 +197,13 @@ class GroundProblem:
     # -- construction -----------------------------------------------------------------------------------------
 
     def _check_goal(self, reachable: Sequence[Instance]) -> None:
-        made = {e.atom for i in reachable for e in i.eff if e.positive} | set(self.problem.init)
+        initial = set(self.problem.init)
+        made = {e.atom for i in reachable for e in i.eff if e.positive} | initial
         unmade = {e.atom for i in reachable for e in i.eff if not e.positive}
         for i, goal in enumerate(self.problem.goal):
             if isinstance(goal.atom.predicate, Derived):
                 continue
-            stuck = goal.atom not in made if goal.positive else goal.atom in self.problem.init and (
+            stuck = goal.atom not in made if goal.positive else goal.atom in initial and (
                 goal.atom not in unmade
             )
             if stuck:

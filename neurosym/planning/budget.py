@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -40,6 +40,10 @@ class Budget:
             if value is not None and not (isinstance(value, int | float | np.number) and whole and value >= 0):
                 kind = "a number" if name == "seconds" else "an integer"
                 raise InputError(f"Expected {name} of a budget to be {kind}, 0 or more; got {value!r}.")
+
+    def less(self, seconds: float) -> Budget:
+        """What is left of it after so many seconds."""
+        return self if self.seconds is None else replace(self, seconds=max(self.seconds - seconds, 0.0))
 
     @property
     def limits(self) -> dict[str, float | int | None]:

@@ -16,9 +16,13 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from neurosym.errors import InputError
+from neurosym.support.deadline import portions
 
 #: Least log-probability a score may have (nats). A prior that is sure still leaves every order a finite cost.
 LOG_FLOOR = -30.0
+
+#: Scores that are normalised at a time: what bounds memory.
+_AT_A_TIME = 1_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,12 +166,12 @@ class OrderScores:
 
 
 def _normalised(table: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Rows that sum to one in exp(), none below the floor (rows of nothing but -inf become uniform)."""
-    if table.size == 0:
-        return table
-    top = table.max(axis=1, keepdims=True)
-    shifted = np.where(np.isfinite(top), table - np.where(np.isfinite(top), top, 0.0), 0.0)
-    shifted = shifted - np.log(np.exp(shifted).sum(axis=1, keepdims=True))
-    floored = np.maximum(shifted, LOG_FLOOR)
-    result: NDArray[np.float64] = floored - np.log(np.exp(floored).sum(axis=1, keepdims=True))
-    return result
+    """Rows that sum to one in exp(), none below the floor (rows of nothing but -inf become uniform), in their place."""
+    for some in portions(np.full(len(table) if table.size else 0, table.shape[1]), _AT_A_TIME):
+        rows = table[some]
+        top = rows.max(axis=1, keepdims=True)
+        shifted = np.where(np.isfinite(top), rows - np.where(np.isfinite(top), top, 0.0), 0.0)
+        shifted -= np.log(np.exp(shifted).sum(axis=1, keepdims=True))
+        floored = np.maximum(shifted, LOG_FLOOR)
+        table[some] = floored - np.log(np.exp(floored).sum(axis=1, keepdims=True))
+    return table

@@ -58,7 +58,9 @@ class OutermostFirst(Prior):
         rank = {name: place for place, name in enumerate(order)}
         place = np.argsort(np.argsort([rank[n] for n in parts]))
         steps = np.arange(len(parts))
-        table = -np.abs(steps[:, None] - place[None, :]) / self.decay
+        table = np.subtract.outer(steps, place).astype(np.float64)
+        np.abs(table, out=table)
+        table /= -self.decay
         return OrderScores(table, problem.actions, classes=problem.classes)
 
 

@@ -11,6 +11,7 @@ from neurosym.language.search_problem import Rejection, SearchProblem, Step
 from neurosym.planning.budget import Budget
 from neurosym.planning.order_scores import OrderScores
 from neurosym.planning.result import Plan, PlanResult, Status
+from neurosym.support.deadline import OutOfTime, within
 
 if TYPE_CHECKING:
     from neurosym.geometry.step_motion import StepMotion
@@ -30,6 +31,7 @@ class _Counts:
     iterations: int = 0
     rejections: list[Rejection] = field(default_factory=list)  # the first `MAX_BLAME`
     start: float = field(default_factory=perf_counter)
+    timed_out: bool = False
 
 
 class SearchLog(Generic[S]):
@@ -77,28 +79,51 @@ class SearchLog(Generic[S]):
         return self._counts.iterations
 
     @property
+    def timed_out(self) -> bool:
+        """Whether the time cut an answer short."""
+        return self._counts.timed_out
+
+    @property
     def seconds(self) -> float:
         return perf_counter() - self._counts.start
+
+    @property
+    def _left(self) -> float | None:
+        return None if self.budget.seconds is None else self.budget.seconds - self.seconds
 
     def out_of_budget(self) -> bool:
         """Whether a limit has been reached: ask before every attempt and every expansion."""
         b = self.budget
         return (
-            (b.attempts is not None and self.attempts >= b.attempts)
+            self.timed_out
+            or (b.attempts is not None and self.attempts >= b.attempts)
             or (b.expansions is not None and self.expansions >= b.expansions)
             or (b.seconds is not None and self.seconds >= b.seconds)
             or (b.watch is not None and b.watch(self))
         )
 
     def candidates(self, state: S) -> Sequence[int]:
-        """The candidates of `state`; counts one expansion."""
+        """The candidates of `state`, none where the time ends meanwhile; counts one expansion."""
         self._counts.expansions += 1
-        return tuple(self.problem.candidates(state))
+        try:
+            with within(self._left):
+                return tuple(self.problem.candidates(state))
+        except OutOfTime:
+            self._counts.timed_out = True
+            return ()
 
     def attempt(self, prefix: tuple[int, ...], state: S, action: int) -> Step[S] | Rejection:
-        """Ask the oracle for `action` after `prefix`, which led to `state`; counts one attempt."""
+        """Ask the oracle for `action` after `prefix`, which led to `state`; counts one attempt.
+
+        Where the time ends meanwhile, the answer is a rejection that promises nothing, and the budget is spent.
+        """
         self._counts.attempts += 1
-        answer = self.problem.attempt(state, action)
+        try:
+            with within(self._left):
+                answer = self.problem.attempt(state, action)
+        except OutOfTime:
+            self._counts.timed_out = True
+            return Rejection("The time ended before there was an answer.", proved=False)
         if isinstance(answer, Rejection):
             self._keep(prefix, action, answer)
         elif len(prefix) >= len(self.best_prefix):
@@ -138,8 +163,11 @@ class SearchLog(Generic[S]):
     def failed(self, status: Status, *, first_guess_failed: bool | None = None) -> PlanResult:
         """The result for a search that ended without a plan.
 
-        What was rejected without proof leaves nothing proved: UNSOLVABLE then becomes GAVE_UP.
+        What was rejected without proof leaves nothing proved: UNSOLVABLE then becomes GAVE_UP. Where the time cut an
+        answer short, the budget ended the search, whatever the planner made of it.
         """
+        if self.timed_out:
+            status = Status.OUT_OF_BUDGET
         if status is Status.UNSOLVABLE and not self.all_proved:
             status = Status.GAVE_UP
         full = self if self.side == "full" else self._other

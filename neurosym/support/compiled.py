@@ -10,6 +10,8 @@ import functools
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
+from neurosym.support.progress import tell
+
 F = TypeVar("F", bound=Callable[..., Any])
 
 #: Functions of one file, by the file's names; whether each is kept on disk by itself.
@@ -34,6 +36,7 @@ def _later(function: F, kept: bool) -> F:
     @functools.wraps(function)
     def call(*given: Any) -> Any:
         if function not in _ready:
+            tell(f"compiling {function.__module__.rpartition('.')[2]} (once, kept on disk)")
             for each, alone in _waiting.pop(file):
                 # In place of what waits: compiled functions look for one another there.
                 _ready[each] = each.__globals__[each.__name__] = _made(each, alone)

@@ -17,6 +17,8 @@ from neurosym.geometry.blocking.sweep import Hits, Sweeps
 from neurosym.geometry.step_motion import Vector
 from neurosym.support.arrays import Array
 from neurosym.support.bitsets import bits, bitsets
+from neurosym.support.deadline import check
+from neurosym.support.progress import tell
 from neurosym.support.words import in_words
 
 
@@ -44,9 +46,12 @@ class BlockingGraph:
     def _hits(self) -> list[Hits]:
         along: list[Hits] = []
         for d, direction in enumerate(self.directions):
+            check()
+            tell("blocking", d, len(self.directions))
             opposite = np.flatnonzero(np.linalg.norm(self.directions[:d] + direction, axis=1) < 1e-12)
             # What hits what going one way is hit by it going the other.
             along.append(along[opposite[0]].reversed() if len(opposite) else self.sweeps.along(direction))
+        tell()
         return along
 
     @cached_property
@@ -83,6 +88,7 @@ class BlockingGraph:
 
         A fixed part has none.
         """
+        check()
         if self.assembly.fixed_mask >> part & 1:
             return []
         return [
@@ -100,6 +106,7 @@ class BlockingGraph:
         rows = None if self._table is None else (self._hit_by if backwards else self._table)[direction]
         moving = waiting = group & among
         while waiting:
+            check()
             rest, hit = among & ~moving, 0
             if rows is not None:
                 for part in bits(waiting):

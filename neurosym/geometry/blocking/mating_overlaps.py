@@ -8,10 +8,11 @@ import numpy as np
 from scipy.spatial import ConvexHull
 
 from neurosym.geometry.assembly import Assembly
-from neurosym.geometry.contact.surfaces import BodySurfaces, Surfaces
+from neurosym.geometry.contact.surfaces import FACETS, BodySurfaces, Surfaces
 from neurosym.geometry.mesh.broad_phase import overlapping_pairs
 from neurosym.support.arrays import Array, Numbers
 from neurosym.support.compiled import compiled
+from neurosym.support.deadline import check, portions
 
 #: Share of the smallest extent that counts as an overlap at rest, however coarse `touch` is: along an oblique joint a
 #: layer thinner than `touch` may yet be deeper and wider than it.
@@ -55,11 +56,16 @@ def mating_overlaps(assembly: Assembly, surfaces: BodySurfaces) -> MatingOverlap
         return MatingOverlaps(near, np.zeros((0, 3)), len(assembly.bodies))
     count = len(assembly.bodies)
     bodies, place = np.unique(near, return_inverse=True)
-    hulls = [_hull(assembly, surfaces.exact, int(b)) for b in bodies]
+    hulls = []
+    for b in bodies:
+        check()
+        hulls.append(_hull(assembly, surfaces.exact, int(b)))
     planes, corners = (np.concatenate([np.zeros((0, k)), *(h[i] for h in hulls)]) for i, k in ((0, 4), (1, 3)))
     first = [np.concatenate([[0], np.cumsum([len(h[i]) for h in hulls], dtype=np.int64)]) for i in (0, 1)]
     pairs = place.reshape(-1, 2).astype(np.int64)
-    depth, normals = _least_overlaps(planes, first[0], corners, first[1], pairs, assembly.mate)
+    depth, normals = np.zeros(len(pairs)), np.zeros((len(pairs), 3))
+    for some in portions(sum(np.diff(f)[pairs].sum(axis=1) for f in first), FACETS):
+        depth[some], normals[some] = _least_overlaps(planes, first[0], corners, first[1], pairs[some], assembly.mate)
     kept = (depth > 2 * half) & (depth <= assembly.mate)
     return MatingOverlaps(near[kept], depth[kept, None] * normals[kept], count)
 

@@ -11,10 +11,12 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-from neurosym.geometry.contact.surfaces import GRID, Surfaces
+from neurosym.geometry.contact.surfaces import FACETS, GRID, Surfaces
 from neurosym.geometry.mesh import kernels, trees
 from neurosym.geometry.mesh.broad_phase import MOST, near_pairs
+from neurosym.geometry.mesh.polygons import union
 from neurosym.support.arrays import Array, Numbers, Truths, bounds
+from neurosym.support.deadline import check, portions
 
 #: So many narrow pieces of an overlap are put together before the rest of them are looked for.
 _FEW = 1_000
@@ -49,17 +51,22 @@ class Shadows:
         hit = np.zeros(len(pairs), dtype=bool)
         asked, most = np.arange(len(pairs)), _FEW
         while len(asked):
-            answers, pieces = kernels.blocked(
-                self.triangles, *self._trees, self.first, pairs[asked], shifts[asked], self.touch, most
-            )
-            wide = answers == 1
-            # Slivers side by side may be wide together: surfaces cut into narrow facets.
-            of_pair, corners = pieces[:, 0].astype(np.int64), pieces[:, 1:].reshape(-1, 8, 2)
-            for k in np.unique(of_pair):
-                wide[k] = _are_wide(corners[of_pair == k], self.touch)
-            hit[asked] = wide
-            asked, most = asked[(answers == 2) & ~wide], np.iinfo(np.int64).max
+            left = [asked[:0]]
+            for some in portions(np.diff(self.first)[pairs[asked]].sum(axis=1), FACETS):
+                answers, pieces = self._blocked(pairs[asked[some]], shifts[asked[some]], most)
+                wide = answers == 1
+                # Slivers side by side may be wide together: surfaces cut into narrow facets.
+                of_pair, corners = pieces[:, 0].astype(np.int64), pieces[:, 1:].reshape(-1, 8, 2)
+                for k in np.unique(of_pair):
+                    check()
+                    wide[k] = _are_wide(corners[of_pair == k], self.touch)
+                hit[asked[some]] = wide
+                left.append(asked[some][(answers == 2) & ~wide])
+            asked, most = np.concatenate(left), np.iinfo(np.int64).max
         return hit
+
+    def _blocked(self, pairs: Numbers, shifts: Array, most: int) -> tuple[Numbers, Array]:
+        return kernels.blocked(self.triangles, *self._trees, self.first, pairs, shifts, self.touch, most)
 
 
 def _are_wide(pieces: Array, touch: float) -> bool:
@@ -78,4 +85,4 @@ def _are_wide(pieces: Array, touch: float) -> bool:
         chosen[np.setdiff1d(np.arange(len(pieces)), other[crowded[one]])] = False
     # A little larger, so that neighbours overlap: what shares an edge to the last digit is where GEOS goes wrong.
     larger = shapely.buffer(shapely.polygons(pieces[chosen]), GRID, join_style="mitre")
-    return not shapely.union_all(larger).buffer(-0.5 - GRID).is_empty
+    return not union(larger, GRID / 16).buffer(-0.5 - GRID).is_empty

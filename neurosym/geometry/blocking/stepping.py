@@ -12,6 +12,7 @@ from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.blocking.sweep import Sweeps
 from neurosym.geometry.contact import collision
 from neurosym.support.arrays import Array
+from neurosym.support.deadline import check
 
 
 def hits_along(sweeps: Sweeps, part: int, direction: Array, others: int) -> int:
@@ -33,6 +34,7 @@ def hits_along(sweeps: Sweeps, part: int, direction: Array, others: int) -> int:
     for owner in np.unique(assembly.owners[meshes[sweeps.triangles_hit(meshes, direction), 1]]):
         hit |= 1 << int(owner)
     for (a, b), apart in zip(pairs[boxes].tolist(), sweeps.mating.apart(pairs[boxes])):
+        check()
         owner = 1 << int(assembly.owners[b])
         if not hit & owner and _meets(assembly, a, b, direction, apart):
             hit |= owner

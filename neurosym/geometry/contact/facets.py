@@ -7,10 +7,12 @@ import shapely
 from numpy.typing import NDArray
 
 from neurosym.geometry.contact.planes import is_wide
-from neurosym.geometry.contact.surfaces import GRID, BodySurfaces
+from neurosym.geometry.contact.surfaces import FACETS, GRID, BodySurfaces
 from neurosym.geometry.mesh import kernels
+from neurosym.geometry.mesh.polygons import intersections
 from neurosym.geometry.mesh.triangles import plane_axes
 from neurosym.support.arrays import Array, Numbers
+from neurosym.support.deadline import check, portions
 
 #: Bodies a and b, corners (k, 3), normal (3,) from a to b, area, gap: see `neurosym.geometry.contact.contacts.Contact`.
 Patch = tuple[int, int, Array, Array, float, float]
@@ -40,10 +42,11 @@ def facet_patches(
     within, is_flat = np.full(len(pairs), 2 * gap), flats.of_triangle >= 0
     small = exact.facing_trees(~is_flat, 2 * gap, sine)
     flat = exact.facing_trees(is_flat, 2 * gap, sine) if is_flat.any() else small
-    near = [
-        kernels.facing_pairs(*one, *two, exact.normals, exact.first, pairs, within, sine)
-        for one, two in ((small, small), (small, flat), (flat, small))[: 3 if is_flat.any() else 1]
-    ]
+    near = []
+    for some in portions(np.diff(exact.first)[pairs].sum(axis=1), FACETS, "contacts"):
+        for one, two in ((small, small), (small, flat), (flat, small))[: 3 if is_flat.any() else 1]:
+            found = kernels.facing_pairs(*one, *two, exact.normals, exact.first, pairs[some], within[some], sine)
+            near.append(np.add(found, (some.start, 0, 0)))
     of_pair, i, j = np.concatenate([*near, np.add(flats.facing(pairs, 2 * gap, sine), (0, m, m))]).T
     # How far apart two planes are is asked again where they have a part in common: they need not be quite parallel.
     reach = 1.1 * sine * np.linalg.norm(np.ptp(surfaces.bodies.bounds[pairs[of_pair, 1]], axis=1), axis=1)
@@ -67,9 +70,8 @@ def facet_patches(
     row, uv = np.repeat(few, counts), corners[np.arange(corners.shape[1]) < counts[:, None]]
     many = np.flatnonzero(i >= m)
     if len(many):
-        # On a grid: with floating numbers GEOS may take two neighbours that share an edge for one and the same.
         seen = [flats.polygons(x[many] - m, origins[number[many]], axes[number[many]]) for x in (i, j)]
-        common = shapely.intersection(*seen, grid_size=GRID * touch)
+        common = intersections(seen[0], seen[1], GRID * touch)
         corners, place = shapely.get_coordinates(common, return_index=True)
         areas, uv = np.concatenate([areas, shapely.area(common)]), np.concatenate([uv, corners])
         row = np.concatenate([row, many[place]])
@@ -116,6 +118,7 @@ def _planes(
     for rows in np.split(order, np.flatnonzero(np.diff(of_pair[order])) + 1):
         own, left, limit = [], rows, sine
         while len(left):
+            check()
             same = normals[left] @ normals[left[0]] > 1 - limit**2 / 2
             same &= np.abs((points[left] - points[left[0]]) @ normals[left[0]]) <= thickness
             own.append(left[same])

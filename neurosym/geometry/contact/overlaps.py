@@ -17,12 +17,14 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from neurosym.geometry.contact.surfaces import BodySurfaces
+from neurosym.geometry.contact.surfaces import FACETS, BodySurfaces
 from neurosym.geometry.mesh import kernels, trees
 from neurosym.geometry.mesh.broad_phase import overlapping_pairs, spans
 from neurosym.geometry.mesh.distances import are_inside, nearest
+from neurosym.geometry.mesh.polygons import intersections
 from neurosym.geometry.mesh.triangles import pierced, plane_axes
 from neurosym.support.arrays import Array, Numbers, Truths
+from neurosym.support.deadline import portions
 
 #: Points (n, 3), and the pair of bodies that each is meant for, int64 (n,).
 Points = tuple[Array, Numbers]
@@ -40,6 +42,8 @@ DENSE, FAR = 100_000, 0.1
 
 #: So many pairs of faces are compared at a time.
 _AT_A_TIME = 1_000_000
+
+_WHAT = "overlaps at rest"
 
 
 @dataclass(frozen=True)
@@ -66,15 +70,16 @@ def overlaps(surfaces: BodySurfaces, fixed: int = 0) -> list[Overlap]:
     # point faces are compared.
     near = surfaces.exact.gaps(pairs, enough=noise, far=2 * noise) <= noise
     overlap = np.zeros(len(pairs), dtype=bool)
-    overlap[near] = _Pairs(surfaces, pairs[near], noise).overlapping()
+    touching = np.flatnonzero(near)
+    for rows in portions(np.diff(surfaces.exact.first)[pairs[touching]].sum(axis=1), FACETS, _WHAT):
+        overlap[touching[rows]] = _Pairs(surfaces, pairs[touching[rows]], noise).overlapping()
     overlap[~near] = _Pairs(surfaces, pairs[~near], noise).contained()
     pairs = pairs[overlap]
     count = np.diff(surfaces.exact.first)[pairs].prod(axis=1)
     depths = [np.zeros(0)]
-    for rows in np.split(np.arange(len(pairs)), np.flatnonzero(np.diff(np.cumsum(count) // _AT_A_TIME)) + 1):
-        if len(rows):
-            some = _Pairs(surfaces, pairs[rows], noise)
-            depths.append(some.depths(np.where(count[rows] <= DENSE, whole, far)))
+    for rows in portions(count, _AT_A_TIME, _WHAT):
+        some = _Pairs(surfaces, pairs[rows], noise)
+        depths.append(some.depths(np.where(count[rows] <= DENSE, whole, far)))
     deep = zip(pairs.tolist(), np.concatenate(depths).tolist())
     return [Overlap(a, b, depth) for (a, b), depth in deep if depth > noise]
 
@@ -207,7 +212,7 @@ class _Pairs:
         if len(large):
             origin, _, axes = self._planes(large, flats.normals, flats.middles)
             one, two = (flats.polygons(f, origin[:, 0], axes) for f in large[:, 1:].T)
-            common = shapely.intersection(one, two, grid_size=self.noise / 10)
+            common = intersections(one, two, self.noise / 10)
             pieces, row = shapely.get_parts(shapely.constrained_delaunay_triangles(common), return_index=True)
             uv = shapely.get_coordinates(shapely.centroid(pieces))
             found.append(self._halfway(large[row], uv, flats.normals, flats.middles))

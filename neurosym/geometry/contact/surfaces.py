@@ -13,14 +13,16 @@ from neurosym.geometry.mesh.connections import adjacent, alike, connected
 from neurosym.geometry.mesh.distances import surface_gaps
 from neurosym.geometry.mesh.flats import Flats
 from neurosym.support.arrays import Array, Numbers, Truths
+from neurosym.support.deadline import portions
 
-#: Polygons are clipped on a grid of this share of the touching tolerance: with floating numbers GEOS may take two
-#: neighbours that share an edge for one and the same (seen with shapely 2 at coordinates of 1e-3).
+#: Polygons are clipped on a grid of this share of the touching tolerance.
 GRID = 1e-3
 
 #: Corners of a flat face lie in its plane to this share of the smallest extent: 32-bit numbers have steps of 1e-7.
 FLAT = 1e-5
 
+#: Pairs of bodies are put to compiled loops until they have so many facets together: some tenths of a second.
+FACETS = 200_000
 
 #: Lowest and highest corners, float64 (2 m, 3) each.
 Trees = tuple[Array, Array]
@@ -105,7 +107,10 @@ class Surfaces:
 
         Of those as near as `enough` it is only told that they are; of those farther than `far`, likewise.
         """
-        return surface_gaps(pairs, self.triangles, *self.trees, self.first, enough, far)
+        gaps = np.zeros(len(pairs))
+        for some in portions(np.diff(self.first)[pairs].sum(axis=1), FACETS):
+            gaps[some] = surface_gaps(pairs[some], self.triangles, *self.trees, self.first, enough, far)
+        return gaps
 
 
 class BodySurfaces:

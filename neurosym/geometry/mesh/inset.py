@@ -7,6 +7,7 @@ from scipy.optimize import nnls
 
 from neurosym.geometry.mesh.triangles import area_vectors
 from neurosym.support.arrays import Array, Numbers
+from neurosym.support.deadline import check
 
 #: Corners nearer than this share of the mesh's extent are one corner.
 WELD = 1e-9
@@ -40,6 +41,7 @@ def inset_vertices(vertices: Array, faces: Numbers, depth: float) -> Array:
     ends = np.flatnonzero(np.diff(corners, append=-1)) + 1
     moved = np.zeros((corner_of.max() + 1, 3))
     for start, end in zip(np.concatenate([[0], ends[:-1]]), ends):
+        check()
         moved[corners[start]] = _way_in(normals[start:end])
     found: Array = vertices + depth * moved[corner_of]
     return found

@@ -20,6 +20,7 @@ from neurosym.geometry.mesh.inset import inset_vertices
 from neurosym.geometry.rigid_motions import Interpolation
 from neurosym.geometry.shapes import Body, Box, Mesh
 from neurosym.support.arrays import Array, Numbers
+from neurosym.support.deadline import check
 
 #: The least step of an advance, as a share of the touching tolerance: an overlap deeper than the tolerance by so much
 #: of it is never missed.
@@ -129,6 +130,7 @@ class Clearance:
                 best = (float(when[first]), *self._named(*pairs[exact][first]))
             pairs = pairs[~exact]
         for i, j in pairs:
+            check()
             until = 1.0 if best is None else best[0]
             share = self._advance(int(i), int(j), a, b, float(travel[i, j]), until)
             if share is not None:
@@ -143,6 +145,7 @@ class Clearance:
         share = 0.0
         try:
             while True:
+                check()
                 collision.place(first, a.at(share) @ self._X[i])
                 if b is not None:
                     collision.place(second, b.at(share) @ self._Y[j])

@@ -21,6 +21,7 @@ from neurosym.geometry.paths.levels import commonest, levels_along
 from neurosym.geometry.paths.removal import Removal
 from neurosym.geometry.rigid_motions import Interpolation, posed
 from neurosym.support.arrays import Array
+from neurosym.support.deadline import check
 
 #: Orientation (a number) and offset along the three axes.
 Node = tuple[int, float, float, float]
@@ -118,6 +119,7 @@ class Lattice:
         edge = _edge(a, b)
         known = self._known.get(edge)
         if known is None:
+            check()
             known = self._known[edge] = self._asked(a, b)
         return known
 

@@ -23,6 +23,7 @@ from neurosym.geometry.paths.trees import Growth, connected, grown_out
 from neurosym.geometry.rigid_motions import Interpolation, posed, shifted
 from neurosym.geometry.step_motion import Kind, StepMotion
 from neurosym.support.arrays import Array
+from neurosym.support.deadline import check
 
 #: What `extract` tries, in this order.
 KINDS: tuple[Kind, ...] = ("lattice", "translation", "rigid")
@@ -144,6 +145,7 @@ def _grown(removal: Removal, kind: Kind, rng: np.random.Generator) -> list[Array
         seed = int(rng.integers(1, 2**31 - 1))
         growth = Growth(step, RESOLUTION / 2**attempt, seed, partial(removal.spent, until))
         poses = _tree(removal, kind == "rigid", growth)
+        check()
         if poses is None:
             continue
         if all(removal.is_clear(Interpolation(a, b, removal.centre)) for a, b in pairwise(poses)):

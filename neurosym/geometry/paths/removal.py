@@ -16,6 +16,7 @@ from neurosym.geometry.rigid_motions import Interpolation, shifted
 from neurosym.geometry.shapes import Box
 from neurosym.geometry.step_motion import Kind, StepMotion, Track
 from neurosym.support.arrays import Array
+from neurosym.support.deadline import check, remaining
 
 _UNTURNED = np.eye(3)
 
@@ -57,6 +58,7 @@ class Removal:
 
     def spend(self) -> None:
         """Count one check; `OutOfBudget` where there are none left."""
+        check()
         self.checks += 1
         if self.spent():
             raise OutOfBudget
@@ -64,7 +66,7 @@ class Removal:
     def spent(self, checks: float = np.inf) -> bool:
         """Whether the budget, or so many checks of it, are used up."""
         late = self._deadline is not None and time.monotonic() > self._deadline
-        return late or self.checks >= min(self.max_checks, checks)
+        return late or remaining() < 0 or self.checks >= min(self.max_checks, checks)
 
     def hit(self, X: Array) -> bool:
         """Whether the moving parts, at a pose (4, 4), are in others or below the ground."""

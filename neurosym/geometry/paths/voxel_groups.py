@@ -20,6 +20,7 @@ from scipy.sparse.csgraph import connected_components
 
 from neurosym.geometry.paths.voxel_gaps import Meeting
 from neurosym.support.bitsets import bits
+from neurosym.support.deadline import check
 
 #: No obstacle ahead, however far.
 ENDLESS = 1 << 30
@@ -61,6 +62,7 @@ def unions(groups: Iterable[int]) -> list[int]:
     """All unions of one or more of these groups, in order of their numbers."""
     every = {0}
     for group in groups:
+        check()
         every |= {group | known for known in every}
     return sorted(every - {0})
 

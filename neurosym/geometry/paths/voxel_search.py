@@ -25,6 +25,7 @@ from neurosym.geometry.paths.voxel_gaps import UNITS, Gaps, Meeting, State
 from neurosym.geometry.paths.voxel_groups import ENDLESS, closures, undriving, unions
 from neurosym.geometry.paths.voxel_separation import DIRECTIONS, Move, Offset, Separation, Stuck
 from neurosym.support.bitsets import bits
+from neurosym.support.deadline import check
 
 #: Up to so many parts, pairs and closures are looked at one by one, which is quicker than arrays are.
 FEW = 24
@@ -98,6 +99,7 @@ class _Search:
             met = []
             best: tuple[int, int, State, int, int] | None = None
             for number, state in enumerate(layer):
+                check()
                 if deadline is not None and number % 64 == 0 and time.monotonic() > deadline:
                     return Stuck(False, len(came), self.among)
                 met.append(self.gaps.meetings(state))
@@ -144,6 +146,7 @@ class _Search:
         for d in range(6):
             # What can go farther than any finite gap can leave. Where other groups are wanted, it may only make way.
             farthest = max((gap for gap, _, _ in ahead[d]), default=0)
+            check()
             for steps in range(1, 1 + (farthest if self.accept is None else self.gaps.across)):
                 groups = unions(closures(ahead[d], self.count, steps, 1))
                 if not groups:

@@ -21,6 +21,7 @@ from neurosym.geometry.readers.obj import read_obj
 from neurosym.geometry.readers.off import read_off
 from neurosym.geometry.readers.ply import read_ply
 from neurosym.geometry.readers.stl import read_stl
+from neurosym.support.deadline import check
 
 #: Formats of one mesh, by the file's ending.
 MESHES: dict[str, Callable[[Path], Contents]] = {".obj": read_obj, ".stl": read_stl, ".ply": read_ply, ".off": read_off}
@@ -49,9 +50,12 @@ def read_folder(folder: Path) -> Contents:
     within_limits(folder, 0, parts=len(every))
     names, notes = distinct([file.stem for file in every])
     meshes: list[RawMesh] = []
+    faces = 0
     for name, file in zip(names, every):
+        check()
         meshes.append(replace(read_mesh(inside(file.parent, file.name)), name=name))
-        within_limits(folder, 0, sum(len(m.faces) for m in meshes))
+        faces += len(meshes[-1].faces)
+        within_limits(folder, 0, faces)
     supports = folder if has_parts or folder.name != PARTS else folder.parent
     fixed = (*_supports(supports), *names[len(files) :])
     return Contents(tuple(meshes), fixed=tuple(dict.fromkeys(fixed)), notes=tuple(notes))

@@ -40,6 +40,7 @@ from neurosym.geometry.readers.urdf import read_urdf
 from neurosym.geometry.shapes import Box, Convex, Part
 from neurosym.geometry.tolerances import DEFAULT_TOLERANCES, Tolerances
 from neurosym.geometry.units import unit
+from neurosym.support.deadline import check
 from neurosym.support.progress import Progress, silent
 
 
@@ -218,6 +219,7 @@ def _examined(
     sound: list[RawMesh | Part] = []
     examiner = Examiner()
     for number, part in enumerate(given):
+        check()
         progress(number)
         if isinstance(part, Part):
             wrong = _wrong(part)

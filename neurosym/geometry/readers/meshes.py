@@ -14,6 +14,7 @@ from neurosym.geometry.rigid_motions import posed, shifted
 from neurosym.geometry.shapes import Body, Box, Convex, Mesh, Part
 from neurosym.geometry.tolerances import Tolerances
 from neurosym.support.arrays import Array, Numbers, bounds
+from neurosym.support.deadline import check
 
 Triangles = tuple[Array, Numbers]
 
@@ -105,6 +106,7 @@ def _mean_frame(frame: Array, meshes: list[Triangles]) -> Array:
 
 def _orthogonal_frame(vertices: Array, faces: Numbers, tolerances: Tolerances) -> Array | None:
     """Rotation (3, 3) whose columns are the directions of all faces, or None when they are not three such."""
+    check()
     normals = area_vectors(vertices[faces])
     lengths = np.linalg.norm(normals, axis=1)
     normals = normals[lengths > 1e-9 * lengths.max()]
@@ -140,6 +142,7 @@ def _common_divisor(gaps: Array) -> float | None:
 
 def _cells(local: Array, faces: Numbers, pitch: float) -> Numbers | None:
     """The cells, int64 (n, 3) from 0, that a mesh in the grid's frame is the union of; None when it is not."""
+    check()
     low = local.min(axis=0)
     counts = np.round(np.ptp(local, axis=0) / pitch).astype(int)
     if counts.min() < 1 or counts.prod() > MAX_CELLS:

@@ -23,6 +23,7 @@ from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.contact.contacts import TABLE, Contact
 from neurosym.geometry.stability.patches import patch_axes
 from neurosym.support.arrays import Array, Numbers, Truths
+from neurosym.support.deadline import check
 
 #: Edges of the pyramid that stands for a friction cone. Its section has the area of the cone's: friction is exact to
 #: 2% in every direction, and does not prefer the axes of the world.
@@ -194,6 +195,7 @@ class _Newton:
         pushed = f0  # f0 + A' z: forces before their negative share is cut off
         f = np.maximum(pushed, 0.0)
         for _ in range(_NEWTON_STEPS):
+            check()
             gradient = weight * z - self.target + self.B @ (f @ self.edges.T).ravel()
             if np.abs(gradient).max(initial=0.0) <= tolerance:
                 break

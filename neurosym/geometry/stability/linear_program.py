@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -12,6 +13,7 @@ from neurosym.errors import NeurosymError
 from neurosym.geometry.contact.contacts import TABLE
 from neurosym.geometry.stability.equilibrium import BALANCE, CONE_EDGES, Balance, Equilibrium
 from neurosym.support.arrays import Numbers
+from neurosym.support.deadline import check, remaining
 
 
 def solve_program(whole: Equilibrium, parts: Numbers, corners: Numbers, names: Sequence[str]) -> Balance:
@@ -46,7 +48,9 @@ def solve_program(whole: Equilibrium, parts: Numbers, corners: Numbers, names: S
         A_eq=hstack([matrix, slack, -slack], format="csc"),
         b_eq=whole.weights[parts].ravel(),
         method="highs-ds",
+        options={} if math.isinf(remaining()) else {"time_limit": max(remaining(), 0.0)},
     )
+    check()
     if result.status != 0:
         raise NeurosymError(
             f"Expected the stability program of {', '.join(names)} to have a solution; "

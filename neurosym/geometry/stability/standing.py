@@ -28,6 +28,7 @@ from neurosym.geometry.stability.linear_program import solve_program
 from neurosym.geometry.stability.patches import masses, merged_patches, neighbours
 from neurosym.support.arrays import Array, Numbers, Truths
 from neurosym.support.bitsets import bits
+from neurosym.support.deadline import check
 
 #: Up to so many movable parts a question is answered from scratch: the evidence is the same whatever was asked before.
 SMALL = 48
@@ -82,6 +83,7 @@ class Stability:
         held &= subset
         answer = self._answers.get((subset, held))
         if answer is None:
+            check()
             answer = self._answer(subset, held)
             if self.remember:
                 self._answers[subset, held] = answer
