@@ -68,6 +68,11 @@ class NetworkPrior(Prior):
         return "full" if self.recipe.train.soft else "paper"
 
     @property
+    def trained_as(self) -> str:
+        """Priors that agree in it read each other's weights."""
+        return self.recipe.trained_as
+
+    @property
     def settings(self) -> dict[str, Any]:
         """All that decides what `fit` makes of demonstrations, as JSON has it."""
         return {**asdict(self.recipe), "encoder": self.encoder}
@@ -94,9 +99,10 @@ class NetworkPrior(Prior):
     def predict(self, pictures: ArrayLike) -> NDArray[np.int64]:
         """The model's own order, as the paper compares it; unlike one of `OrderScores`, it may be wrong by itself.
 
-        Plain ``bc`` and ``tcn-paper`` take the likeliest action of each step, so the same one may come twice. All
-        others take the likeliest number of steps, if that is unsure, and the best assignment of actions to them;
-        the full recipes sum the probabilities of interchangeable actions first.
+        Plain ``bc`` and ``tcn-paper`` take the likeliest action of each step, so the same one may come twice; those as
+        published read a number (`learned_priors.recipes`). All others take the likeliest number of steps, if that is
+        unsure, and the best assignment of actions to them; the full recipes sum the probabilities of interchangeable
+        actions first.
 
         Returns:
             int64 (M, T) for a batch, (T,) for one: indices into the actions of the training; -1 after the last step.
@@ -104,8 +110,8 @@ class NetworkPrior(Prior):
         """
         batch, single = as_picture_batch(pictures)
         trained = self._weights.for_pictures(batch.shape[1:])
-        assigned, sum_classes = self.recipe.predicts == "assignment", self.recipe.train.sum_classes
-        orders = trained.orders(batch, assigned=assigned, sum_classes=sum_classes)
+        sum_classes = self.recipe.train.sum_classes
+        orders = trained.orders(batch, predicts=self.recipe.predicts, sum_classes=sum_classes)
         return orders[0] if single else orders
 
     def scores(self, problems: Sequence[Problem]) -> list[OrderScores]:
@@ -158,6 +164,7 @@ class NetworkPrior(Prior):
             resume: go on from the checkpoint if it is there.
             config: instead of the recipe's `TrainConfig`.
             settings: fields of the `TrainConfig` to change, ``{"epochs": 25, "rate": 4e-3}``; `epochs` goes before.
+                Besides, ``"head"`` and ``"width"`` of the network.
         """
         if device is not None:
             self.device = self._weights.device = _checked_device(device)

@@ -21,8 +21,9 @@ from neurosym.experiments.studies import SCALES, study, study_names
 def test_each_has_demonstrations_enough_and_settings_that_exist(name, scale):
     given = study(name, scale)
     family = ns.load_domain(given.domain)
-    for method in given.methods:
-        assert RECIPES[method].train.changed(given.train.get(method, {}))
+    for method in (*given.methods, *given.controls):
+        prior, settings = given.training(method)
+        assert RECIPES[prior].train.changed({k: v for k, v in settings.items() if k not in ("head", "width")})
     assert set(given.train) <= set(given.methods)
     for n in given.sizes:
         for part, options in (("train", given.options(n)), (given.part, given.test(n))):
@@ -44,7 +45,7 @@ def test_the_paper_scale_has_the_papers_sizes():
 
 
 def test_settings_that_a_study_changes_reach_the_training_and_the_key(tmp_path):
-    given = replace(study("tower"), methods=("bc",), baselines=(), pictures=("easy",), sizes=(6,), seeds=1, figures=())
+    given = replace(study("tower"), methods=("bc",), baselines=(), controls={}, figures=(), sizes=(6,), seeds=1)
     given = replace(given, test=lambda _: {"variant": "colours", "count": 5})
     short, long = (replace(given, train={"bc": {"epochs": n}}) for n in (1, 40))
     reproduce_study(short, tmp_path)
