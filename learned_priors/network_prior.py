@@ -96,7 +96,7 @@ class NetworkPrior(Prior):
         scores = self._weights.for_pictures(batch.shape[1:]).scores(batch)
         return scores[0] if single else scores
 
-    def predict(self, pictures: ArrayLike) -> NDArray[np.int64]:
+    def predict(self, pictures: ArrayLike, *, lengths: NDArray[np.int64] | None = None) -> NDArray[np.int64]:
         """The model's own order, as the paper compares it; unlike one of `OrderScores`, it may be wrong by itself.
 
         Plain ``bc`` and ``tcn-paper`` take the likeliest action of each step, so the same one may come twice; those as
@@ -104,14 +104,17 @@ class NetworkPrior(Prior):
         unsure, and the best assignment of actions to them; the full recipes sum the probabilities of interchangeable
         actions first.
 
+        Args:
+            pictures: as for `read`.
+            lengths: int64 (M,), the true numbers of steps, as the published evaluations give them; None reads them.
+
         Returns:
             int64 (M, T) for a batch, (T,) for one: indices into the actions of the training; -1 after the last step.
-            Pictures as for `read`.
         """
         batch, single = as_picture_batch(pictures)
         trained = self._weights.for_pictures(batch.shape[1:])
         sum_classes = self.recipe.train.sum_classes
-        orders = trained.orders(batch, predicts=self.recipe.predicts, sum_classes=sum_classes)
+        orders = trained.orders(batch, predicts=self.recipe.predicts, sum_classes=sum_classes, lengths=lengths)
         return orders[0] if single else orders
 
     def scores(self, problems: Sequence[Problem]) -> list[OrderScores]:

@@ -56,12 +56,20 @@ class TrainedNetwork:
             scores += [OrderScores(table, actions, length, self.classes) for table, length in zip(tables, by_table)]
         return scores
 
-    def orders(self, batch: NDArray[np.uint8], *, predicts: Prediction, sum_classes: bool) -> NDArray[np.int64]:
+    def orders(
+        self,
+        batch: NDArray[np.uint8],
+        *,
+        predicts: Prediction,
+        sum_classes: bool,
+        lengths: NDArray[np.int64] | None = None,
+    ) -> NDArray[np.int64]:
         """The network's own orders: int64 (M, T), -1 after the last step.
 
         Args:
             predicts: see `learned_priors.recipes.Recipe`.
             sum_classes: sum the probabilities of interchangeable actions before they are assigned.
+            lengths: int64 (M,), the numbers of steps where they are known; None reads them, too.
         """
         if predicts not in get_args(Prediction):
             raise InputError(f"Expected how to predict, one of {', '.join(get_args(Prediction))}; got {predicts!r}.")
@@ -69,6 +77,10 @@ class TrainedNetwork:
         orders = [np.empty((0, self.network.config.n_steps), dtype=np.int64)]
         for logits in self._logits(batch):
             table, length = self.network.tables(logits)
+            done = sum(len(own) for own in orders)
+            steps = None if lengths is None else lengths[done : done + len(table)]
+            if steps is not None:
+                length = np.where(np.arange(table.shape[1] + 1) == steps[:, None], 0.0, -np.inf)
             if predicts == "assignment":
                 orders.append(decoded(table, classes, log_length=length))
                 continue
@@ -78,7 +90,8 @@ class TrainedNetwork:
                 order = np.stack([linear_sum_assignment(1 - np.exp(rows))[1] for rows in table])
             else:
                 order = self._nearest_number(table)
-            order[np.arange(order.shape[1]) >= _likeliest_length(logits)[:, None]] = -1
+            steps = _likeliest_length(logits) if steps is None else steps
+            order[np.arange(order.shape[1]) >= steps[:, None]] = -1
             orders.append(order)
         return np.concatenate(orders)
 

@@ -183,7 +183,7 @@ def test_each_family_of_methods_is_set_against_the_papers_order_and_controls_hav
     means |= {(apart, "whole_sequence"): 0.1, (loss, "whole_sequence"): 0.72, ("bc+hungarian", "whole_sequence"): 0.71}
     page = report(made_up("tower", means))
     assert "* With the losses as published: whole sequences come out in the paper's order: bc-published 0.400" in page
-    assert "All 10 pairs do." in page
+    assert "All 10 pairs do; the narrowest: `bc-published+hungarian` is ahead of `bc-published` by 0.100, in 2" in page
     assert "* With those of the paper's text: whole sequences do **not** come out" in page
     assert "* Why: With blocks of one colour numbered apart" in page
     assert f"| 200 | sinkhorn-published | {apart} | 0.100 ± 0.005 |" in page

@@ -56,7 +56,11 @@ def _order(results: Results, style: str, title: str, methods: tuple[str, ...]) -
     orders = f"the paper's order: {own} (the paper: {' < '.join(f'{m} {published[m]:.2f}' for m in ranked)})."
     what = f"{title}: whole sequences" if title else "Whole sequences"
     if not otherwise:
-        return [f"{what} come out in {orders} All {len(pairs)} pairs do."]
+        worse, better = min(pairs, key=lambda pair: means[pair[1]] - means[pair[0]])
+        seeds = list(zip(*(results.values(style, m, max(study.sizes), "whole_sequence") for m in (worse, better))))
+        narrowest = f"`{better}` is ahead of `{worse}` by {means[better] - means[worse]:.3f}"
+        in_seeds = f", in {sum(b > a for a, b in seeds)} of {len(seeds)} seeds" if len(seeds) > 1 else ""
+        return [f"{what} come out in {orders} All {len(pairs)} pairs do; the narrowest: {narrowest}{in_seeds}."]
     return [
         f"{what} do **not** come out in {orders} {len(pairs) - len(otherwise)} of its {len(pairs)} pairs do; "
         f"otherwise: {'; '.join(otherwise)}."

@@ -92,6 +92,10 @@ def run_trial(trial: Trial, given: Study, epochs: int | None = None) -> dict[str
         learner.save(kept)
     orders = learner.predict(test.pictures)
     figures = averages(compare_orders(orders, test, classes_of(test)), seen)
+    if len(set(test.lengths)) > 1:
+        given_lengths = learner.predict(test.pictures, lengths=test.lengths)
+        own = compare_orders(given_lengths, test, classes_of(test))["per_step"]
+        figures["per_step_given_length"] = float(own.mean())
     training = learner.header["training"]
     figures |= {"training_seconds": float(training["seconds"]), "epochs": float(training["epochs"])}
     return {"figures": figures, "counts": Counts.of(orders, test).to_json()}

@@ -22,6 +22,7 @@ _METRICS = {
     "whole_sequence_unseen": "whole, unseen",
     "per_step": "per step",
     "per_step_unseen": "per step, unseen",
+    "per_step_given_length": "per step, length given",
     "stop_accuracy": "stop accuracy",
     "re_use": "re-use",
     "epochs": "epochs",
