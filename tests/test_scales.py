@@ -39,6 +39,10 @@ def test_the_paper_scale_has_the_papers_sizes():
     assert study("scrabble", "paper").sizes[:3] + study("scrabble", "paper").sizes[-2:] == (6, 11, 16, 96, 98)
     assert study("scrabble", "paper").test(98)["count"] == 5_000
     assert soma_experiment("paper").splits == 100
+    published = soma_experiment(name="soma-published")
+    assert (published.epochs, published.splits, published.domain, published.name) == (1500, 1, "soma", "soma-published")
+    with pytest.raises(ns.UnknownNameError, match="Did you mean 'soma-published'"):
+        soma_experiment(name="soma-publish")
     for scale in (lambda: study("tower", "papre"), lambda: soma_experiment("papre")):
         with pytest.raises(ns.UnknownNameError, match="Did you mean 'paper'"):
             scale()
