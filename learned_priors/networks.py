@@ -26,6 +26,8 @@ from neurosym.errors import CheckpointError
 Head = Literal["dense", "tcn", "tcn-published", "glimpses"]
 Decoding = Literal["sinkhorn", "rows"]
 Stop = Literal["none", "head", "network", "class"]
+#: How an order is made of a network's answer, see `learned_priors.recipes.Recipe`.
+Prediction = Literal["assignment", "independent", "published-assignment", "expected-number"]
 
 #: Column updates when reading: after so many, columns of near ties are off by about 1e-3 (see `MAX_ITERATIONS`).
 READ_ITERATIONS = 1_000

@@ -6,9 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from learned_priors.networks import Decoding, Head, NetworkConfig, Stop
+from learned_priors.networks import Decoding, Head, NetworkConfig, Prediction, Stop
 from learned_priors.train_config import TrainConfig
-from learned_priors.trained_network import Prediction
 from neurosym.errors import InputError, UnknownNameError
 from neurosym.language.demonstrations import Demonstrations
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from typing import Any, get_args
 
 import numpy as np
 import torch
@@ -12,12 +12,9 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from learned_priors.metrics import decoded
-from learned_priors.networks import Logits, OrderNetwork
+from learned_priors.networks import Logits, OrderNetwork, Prediction
 from neurosym.errors import InputError
 from neurosym.planning.order_scores import OrderScores
-
-#: How an order is made of a network's answer, see `learned_priors.recipes.Recipe`.
-Prediction = Literal["assignment", "independent", "published-assignment", "expected-number"]
 
 
 @dataclass(frozen=True, eq=False)
