@@ -19,7 +19,7 @@ from neurosym.experiments.imitation import study, study_names
 from neurosym.experiments.order_accuracy import Counts
 from neurosym.experiments.reporting import RECORD
 from neurosym.experiments.results_page import LARGEST, finished_runs, write_results_page
-from neurosym.experiments.studies import Results
+from neurosym.experiments.study_grid import Results
 from neurosym.experiments.study_report import figures, report, write_results
 from neurosym.plotting import COLUMN, kernel_density
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import combinations
 
 from neurosym.experiments.hypotheses import OF_OURS, OF_THE_PAPER, REASONS
-from neurosym.experiments.studies import Results
+from neurosym.experiments.study_grid import Results
 
 #: Metrics in which our recipe is set against the paper's, as sentences name them.
 COMPARED = {

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Any
 
-from neurosym.experiments.studies import Results
+from neurosym.experiments.study_grid import Results
 
 #: Shares that differ by less are called alike.
 ALIKE = 0.05

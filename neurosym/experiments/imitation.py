@@ -18,7 +18,8 @@ from neurosym.experiments.baselines import BASELINES
 from neurosym.experiments.engines import run_tasks
 from neurosym.experiments.journal import Journal, key_of
 from neurosym.experiments.order_accuracy import Counts, averages, classes_of, compare_orders, seen_in
-from neurosym.experiments.studies import Results, Study, Trial, study, study_names
+from neurosym.experiments.studies import study, study_names
+from neurosym.experiments.study_grid import Results, Study, Trial
 from neurosym.experiments.study_report import report, write_results
 from neurosym.language.problem_family import Progress
 from neurosym.registry import load_domain, load_prior

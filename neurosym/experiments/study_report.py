@@ -11,7 +11,7 @@ from typing import Any
 from neurosym import __version__, plotting
 from neurosym.experiments.conclusions import conclusions
 from neurosym.experiments.reporting import Drawn, markdown_table, provenance, spread, write_experiment
-from neurosym.experiments.studies import Results
+from neurosym.experiments.study_grid import Results
 from neurosym.plotting import Curves, Panel, Spread
 
 #: Classes above which each method's confusion matrix is a figure of its own.
