@@ -146,8 +146,8 @@ _SCRABBLE = Study(
         # It learns to stop, and then nothing more: until its loss has not fallen for three epochs.
         "tcn-published+hungarian": {**_WORDS, "epochs": 30, "patience": 3},
         "tcn-paper+hungarian": {**_WORDS, "epochs": 30},
-        # With 98 tiles it reads .73, .89 of the letters after 38, 120 epochs (twice the rate: .19 after 29). Which tile of a
-        # letter was demonstrated is chance, so the loss of words that are held out rests long before the letters do.
+        # With 98 tiles it reads .73, .89 of the letters after 38, 120 epochs (twice the rate: .19 after 29). Which tile
+        # of a letter was demonstrated is chance: the loss of words that are held out rests long before the letters do.
         "sinkhorn-paper": {**_WORDS, "epochs": 200},
     },
     about="Words of three to six of the first n tiles (the paper's Sec. IV-E, Fig. 8 and 9).",
