@@ -43,7 +43,7 @@ readme: demo
 	sed -i -e '/<!-- table:begin/,/<!-- table:end/{//!d}' -e '/<!-- table:begin/r $(OUT)/results.md' README.md
 
 # A run that was killed goes on where it was.
-EXPERIMENTS := tower tower-by-sequence unseen variable soma scrabble
+EXPERIMENTS := tower tower-easy tower-by-sequence unseen variable soma soma-published scrabble
 reproduce: $(STAMP)
 	@for name in $(EXPERIMENTS); do $(BIN)/neurosym reproduce $$name > /dev/null || exit 1; done
 	@$(MAKE) results

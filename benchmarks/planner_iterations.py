@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from neurosym.experiments.benchmark import NO_PRIOR, Comparison, Outcome, run
+from neurosym.experiments.benchmark import NO_PRIOR, OUTERMOST, Comparison, Outcome, run
 from neurosym.experiments.engines import cores
 from neurosym.experiments.reporting import rows
 from neurosym.registry import load_domain
 
-PRIORS = (NO_PRIOR, "tcn-paper", "sinkhorn-paper", "tcn", "sinkhorn")
+PRIORS = (NO_PRIOR, OUTERMOST, "tcn-paper", "sinkhorn-paper", "tcn", "sinkhorn")
 numbers = tuple(load_domain("soma").numbers("test"))
 comparison = Comparison("soma", numbers, ("swap-repair", "backtracking", "best-first"), PRIORS, seeds=5)
 found = {(r["prior"], r["planner"]): r for r in rows(Outcome(comparison, run(comparison, workers=cores())))}

@@ -8,11 +8,14 @@ from __future__ import annotations
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
+from torch.nn.utils.parametrizations import weight_norm
 
 from learned_priors.encoders import Encoder
 
 #: Each temporal layer looks at a step and one before, as in the reference network; dilation widens that to all steps.
 KERNEL = 2
+#: Of the published temporal network.
+PUBLISHED_DROPOUT = 0.2
 
 #: Glimpses a step. With one, training was stuck in half of the runs: where all pictures show the same colours in other
 #: orders, a glimpse that is too wide sees the same in all, and nothing says where to turn.
@@ -59,6 +62,44 @@ class TemporalDecoder(nn.Module):
             x = x + torch.relu(layer(functional.pad(x, ((KERNEL - 1) * dilation, 0))))
         logits: Tensor = self.logits(x.transpose(1, 2))
         return logits
+
+
+class PublishedTemporalDecoder(nn.Module):
+    """The temporal network as its code was published, where the steps are channels.
+
+    A linear layer gives each row a latent state of `width` dimensions; the convolutions run along these dimensions,
+    whose order means nothing, and mix all rows at each of them: there is no time in it, and `rows` channels make
+    rows^2 weights a convolution. Each block, after Bai, Kolter, Koltun (arXiv:1803.01271): twice a causal convolution
+    (kernel 2, weights normalised, dilation 1, 2, 4, ...), ReLU, dropout; added to its input; ReLU.
+
+    Shapes: (B, features) -> (B, rows, columns).
+    """
+
+    def __init__(self, features: int, rows: int, columns: int, *, width: int, blocks: int) -> None:
+        super().__init__()
+        self.rows, self.width = rows, width
+        self.states = nn.Linear(features, rows * width)
+        self.blocks = nn.ModuleList(_PublishedBlock(rows, 2**i) for i in range(blocks))
+        self.logits = nn.Linear(width, columns)
+
+    def forward(self, features: Tensor) -> Tensor:
+        x = self.states(features).unflatten(1, (self.rows, self.width))
+        for block in self.blocks:
+            x = torch.relu(x + block(x))
+        logits: Tensor = self.logits(x)
+        return logits
+
+
+class _PublishedBlock(nn.Sequential):
+    """Two dilated causal convolutions (B, channels, length), each with ReLU and dropout."""
+
+    def __init__(self, channels: int, dilation: int) -> None:
+        layers: list[nn.Module] = []
+        for _ in range(2):
+            pad = nn.ConstantPad1d(((KERNEL - 1) * dilation, 0), 0.0)
+            layers += [pad, weight_norm(nn.Conv1d(channels, channels, KERNEL, dilation=dilation)), nn.ReLU()]
+            layers.append(nn.Dropout(PUBLISHED_DROPOUT))
+        super().__init__(*layers)
 
 
 class GlimpseHead(nn.Module):

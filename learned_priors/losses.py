@@ -62,6 +62,18 @@ def squared_error(log_samples: Tensor, target: Tensor) -> Tensor:
     return off.sum() / entries
 
 
+def squared_error_of_numbers(log_samples: Tensor, target: Tensor, numbers: Sequence[int] = ()) -> Tensor:
+    """As the towers' code was published: a_o holds the actions' numbers, so each step's expected number is compared.
+
+    Actions of neighbouring numbers are then nearly alike. Where these are interchangeable blocks, which the picture
+    does not tell apart, that is a hint that one-hot vectors do not give. Shapes as for `squared_error`.
+    """
+    number = torch.arange(target.shape[-1]) if not numbers else torch.as_tensor(list(numbers))
+    number = number.to(target)
+    off = ((log_samples.exp() @ number - target @ number) ** 2) * (target.sum(dim=-1) > 0)
+    return off.sum() / ((target.sum(dim=-1) > 0).sum().clamp(min=1) * log_samples.shape[0])
+
+
 def loss_of(logits: Logits, target: Tensor, config: TrainConfig) -> Tensor:
     """The training loss of logits against targets (B, T, N), a scalar.
 
@@ -70,9 +82,10 @@ def loss_of(logits: Logits, target: Tensor, config: TrainConfig) -> Tensor:
     """
     if logits.stop is not None:
         joint = torch.cat([logits.order, logits.stop[..., None]], dim=-1)
+        target = functional.pad(target, (0, 0, 0, joint.shape[1] - target.shape[1]))
         stopped = torch.cat([target, (target.sum(dim=-1, keepdim=True) == 0).to(target.dtype)], dim=-1)
         classes = (*config.classes, max(config.classes) + 1) if config.classes else ()
-        return cross_entropy(torch.log_softmax(joint, dim=-1), stopped, classes)
+        return cross_entropy(_by_row(joint, config), stopped, classes)
     loss = _order_loss(logits.order, target, config)
     if logits.length is not None:
         steps = (target.sum(dim=-1) > 0).sum(dim=-1)
@@ -82,13 +95,21 @@ def loss_of(logits: Logits, target: Tensor, config: TrainConfig) -> Tensor:
 
 def _order_loss(order: Tensor, target: Tensor, config: TrainConfig) -> Tensor:
     temperature, iterations = config.temperature, config.iterations
-    if config.loss == "gumbel-sinkhorn":
+    if config.loss in ("gumbel-sinkhorn", "gumbel-sinkhorn-numbers"):
         samples = gumbel_sinkhorn(
             order, samples=config.samples, temperature=temperature, noise=config.noise, iterations=iterations
         )
+        if config.loss == "gumbel-sinkhorn-numbers":
+            return squared_error_of_numbers(samples, target, config.numbers)
         return squared_error(samples, target)
     if config.loss == "sinkhorn":
         log_prob = log_sinkhorn(order / temperature, tolerance=None, max_iterations=iterations)
     else:
-        log_prob = torch.log_softmax(order, dim=-1)
+        log_prob = _by_row(order, config)
     return cross_entropy(log_prob, target, config.classes)
+
+
+def _by_row(logits: Tensor, config: TrainConfig) -> Tensor:
+    """Log-probabilities of a row's entries. A softmax of the softmax is at most e times as sure of one as of another:
+    its gradient nearly vanishes long before the network is right."""
+    return torch.log_softmax(torch.softmax(logits, dim=-1) if config.loss == "rows-twice" else logits, dim=-1)

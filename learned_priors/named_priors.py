@@ -34,3 +34,30 @@ bc = partial(NetworkPrior, "bc")
 
 bc_hungarian = partial(NetworkPrior, "bc+hungarian")
 """The paper's BC+Hungarian: the same network, `predict` assigns each action at most once."""
+
+bc_published = partial(NetworkPrior, "bc-published")
+"""BC as its code was published: cross-entropy of a softmax of the softmax, each step read as round(sum p id).
+
+The loss hardly falls once an action is a little likelier than others, and the mean number of two blocks that look alike
+is right only where they are numbered as neighbours.
+"""
+
+bc_published_hungarian = partial(NetworkPrior, "bc-published+hungarian")
+"""BC+Hungarian as published: the same network, each action assigned at most once, at the cost 1 - p."""
+
+tcn_published = partial(NetworkPrior, "tcn-published")
+"""BC+TCN as published: loss and reading as of ``bc-published``, and a temporal network whose channels are the steps.
+
+It convolves over latent dimensions, not over time. Where orders may end early it has N + 1 rows and N + 1 classes, and
+nearly all that it learns is to stop: with many actions the few rows that are read hardly count.
+"""
+
+tcn_published_hungarian = partial(NetworkPrior, "tcn-published+hungarian")
+"""BC+TCN+Hungarian as published: the same network, each action assigned at most once, at the cost 1 - p."""
+
+sinkhorn_published = partial(NetworkPrior, "sinkhorn-published")
+"""BC+Sinkhorn as its towers' code was published: a_o are integers, so each step's expected number is compared.
+
+Blocks of one colour have neighbouring numbers there. So the loss tells which blocks are nearly alike; numbered apart,
+it reads hardly any tower. The paper's text has one-hot vectors, ``sinkhorn-paper``.
+"""

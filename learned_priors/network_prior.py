@@ -68,6 +68,11 @@ class NetworkPrior(Prior):
         return "full" if self.recipe.train.soft else "paper"
 
     @property
+    def trained_as(self) -> str:
+        """Priors that agree in it read each other's weights."""
+        return self.recipe.trained_as
+
+    @property
     def settings(self) -> dict[str, Any]:
         """All that decides what `fit` makes of demonstrations, as JSON has it."""
         return {**asdict(self.recipe), "encoder": self.encoder}
@@ -91,21 +96,25 @@ class NetworkPrior(Prior):
         scores = self._weights.for_pictures(batch.shape[1:]).scores(batch)
         return scores[0] if single else scores
 
-    def predict(self, pictures: ArrayLike) -> NDArray[np.int64]:
+    def predict(self, pictures: ArrayLike, *, lengths: NDArray[np.int64] | None = None) -> NDArray[np.int64]:
         """The model's own order, as the paper compares it; unlike one of `OrderScores`, it may be wrong by itself.
 
-        Plain ``bc`` and ``tcn-paper`` take the likeliest action of each step, so the same one may come twice. All
-        others take the likeliest number of steps, if that is unsure, and the best assignment of actions to them;
-        the full recipes sum the probabilities of interchangeable actions first.
+        Plain ``bc`` and ``tcn-paper`` take the likeliest action of each step, so the same one may come twice; those as
+        published read a number (`learned_priors.recipes`). All others take the likeliest number of steps, if that is
+        unsure, and the best assignment of actions to them; the full recipes sum the probabilities of interchangeable
+        actions first.
+
+        Args:
+            pictures: as for `read`.
+            lengths: int64 (M,), the true numbers of steps, as the published evaluations give them; None reads them.
 
         Returns:
             int64 (M, T) for a batch, (T,) for one: indices into the actions of the training; -1 after the last step.
-            Pictures as for `read`.
         """
         batch, single = as_picture_batch(pictures)
         trained = self._weights.for_pictures(batch.shape[1:])
-        assigned, sum_classes = self.recipe.predicts == "assignment", self.recipe.train.sum_classes
-        orders = trained.orders(batch, assigned=assigned, sum_classes=sum_classes)
+        sum_classes = self.recipe.train.sum_classes
+        orders = trained.orders(batch, predicts=self.recipe.predicts, sum_classes=sum_classes, lengths=lengths)
         return orders[0] if single else orders
 
     def scores(self, problems: Sequence[Problem]) -> list[OrderScores]:
@@ -158,6 +167,7 @@ class NetworkPrior(Prior):
             resume: go on from the checkpoint if it is there.
             config: instead of the recipe's `TrainConfig`.
             settings: fields of the `TrainConfig` to change, ``{"epochs": 25, "rate": 4e-3}``; `epochs` goes before.
+                Besides, ``"head"`` and ``"width"`` of the network.
         """
         if device is not None:
             self.device = self._weights.device = _checked_device(device)

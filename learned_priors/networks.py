@@ -13,13 +13,21 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from learned_priors.encoders import PictureShape, build_encoder
-from learned_priors.heads import GlimpseHead, StoppingNetwork, TemporalDecoder, log_length_of_stops
+from learned_priors.heads import (
+    GlimpseHead,
+    PublishedTemporalDecoder,
+    StoppingNetwork,
+    TemporalDecoder,
+    log_length_of_stops,
+)
 from learned_priors.sinkhorn import TOLERANCE, log_sinkhorn, scaled_sinkhorn
 from neurosym.errors import CheckpointError
 
-Head = Literal["dense", "tcn", "glimpses"]
+Head = Literal["dense", "tcn", "tcn-published", "glimpses"]
 Decoding = Literal["sinkhorn", "rows"]
 Stop = Literal["none", "head", "network", "class"]
+#: How an order is made of a network's answer, see `learned_priors.recipes.Recipe`.
+Prediction = Literal["assignment", "independent", "published-assignment", "expected-number"]
 
 #: Column updates when reading: after so many, columns of near ties are off by about 1e-3 (see `MAX_ITERATIONS`).
 READ_ITERATIONS = 1_000
@@ -34,7 +42,8 @@ class NetworkConfig:
 
     Attributes:
         encoder: a name that `build_encoder` knows.
-        head: "dense" (a perceptron), "tcn" (temporal convolutions) or "glimpses" (looks at one place a step).
+        head: "dense" (a perceptron), "tcn" (temporal convolutions), "tcn-published" (the same as published) or
+            "glimpses" (looks at one place a step).
         decoding: what turns logits into log-probabilities: "sinkhorn", or "rows" (a softmax a step).
         picture_shape: (V, H, W, 3).
         n_steps, n_actions: T and N; T < N makes a rectangular head.
@@ -47,6 +56,7 @@ class NetworkConfig:
         stop: what tells how many of the T steps a task takes. "none": all of them; "head": a layer on the features of
             the one encoder; "network": a network of its own, with an encoder of its own (the paper's, Sec. IV-B);
             "class": one more action, to stop, at every step (the paper's extension of its temporal network).
+        spare_rows: rows beyond the T steps, which learn to stop and are not read.
     """
 
     encoder: str
@@ -59,6 +69,7 @@ class NetworkConfig:
     temperature: float = 1.0
     stop: Stop = "none"
     iterations: int | None = None
+    spare_rows: int = 0
 
     def to_json(self) -> dict[str, Any]:
         return {**asdict(self), "picture_shape": list(self.picture_shape)}
@@ -77,6 +88,8 @@ class NetworkConfig:
                 raise ValueError(f"unknown stop {config.stop!r}, or a stop class that is not decoded by rows")
             if config.iterations is not None and (type(config.iterations) is not int or config.iterations < 1):
                 raise ValueError(f"iterations are to be a positive integer or null: {config.iterations!r}")
+            if type(config.spare_rows) is not int or config.spare_rows < 0:
+                raise ValueError(f"spare rows are to be a number, 0 or more: {config.spare_rows!r}")
             if config.n_steps > config.n_actions or not config.temperature > 0:
                 raise ValueError("more steps than actions, or a temperature that is not positive")
         except (TypeError, KeyError, ValueError) as error:
@@ -118,20 +131,23 @@ class OrderNetwork(nn.Module):
         super().__init__()
         self.config = config
         self.encoder = build_encoder(config.encoder, config.picture_shape)
-        features, steps, width = self.encoder.out_features, config.n_steps, config.width
+        features, steps, width = self.encoder.out_features, config.n_steps + config.spare_rows, config.width
         columns = config.n_actions + (config.stop == "class")
         self.head: nn.Module
         if config.head == "tcn":
             self.head = TemporalDecoder(features, steps, columns, width=width)
+        elif config.head == "tcn-published":
+            blocks = config.n_steps + (config.stop == "class")
+            self.head = PublishedTemporalDecoder(features, steps, columns, width=width, blocks=blocks)
         elif config.head == "glimpses":
             self.head = GlimpseHead(features, self.encoder.places_shape, steps, columns, width=width)
         else:
             layers = nn.Linear(features, width), nn.ReLU(), nn.Linear(width, steps * columns)
             self.head = nn.Sequential(*layers, nn.Unflatten(1, (steps, columns)))
         if config.stop == "head":
-            self.length = nn.Linear(features, steps + 1)
+            self.length = nn.Linear(features, config.n_steps + 1)
         elif config.stop == "network":
-            self.stopping = StoppingNetwork(build_encoder(config.encoder, config.picture_shape), steps)
+            self.stopping = StoppingNetwork(build_encoder(config.encoder, config.picture_shape), config.n_steps)
 
     def prepare(self, pictures: Tensor) -> Tensor:
         """uint8 (B, V, H, W, 3) -> what `forward` takes; done once for pictures that are seen many times."""
@@ -148,6 +164,8 @@ class OrderNetwork(nn.Module):
         features = self.encoder(prepared)
         places = (self.encoder.places(prepared),) if self.config.head == "glimpses" else ()
         table = self.head(features, *places)
+        if not self.training:
+            table = table[:, : self.config.n_steps]
         if self.config.stop == "class":
             return Logits(table[..., :-1], stop=table[..., -1])
         if self.config.stop == "head":

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, Literal
+from typing import Any
 
-from learned_priors.networks import Decoding, Head, NetworkConfig, Stop
+from learned_priors.networks import Decoding, Head, NetworkConfig, Prediction, Stop
 from learned_priors.train_config import TrainConfig
 from neurosym.errors import InputError, UnknownNameError
 from neurosym.language.demonstrations import Demonstrations
@@ -30,8 +30,9 @@ class Recipe:
         head, width, decoding: of the network, see `NetworkConfig`.
         train: the settings of its training.
         stop: what tells the number of steps, where demonstrations differ in it; see `NetworkConfig`.
-        predicts: "assignment" (the Hungarian algorithm; no action twice) or "independent" (the likeliest of each
-            step, which may be the same twice).
+        predicts: "assignment" (the Hungarian algorithm on -log P; no action twice) or "independent" (the likeliest of
+            each step, which may be the same twice); as published, "published-assignment" (the Hungarian algorithm on
+            1 - P) or "expected-number" (round(sum_j P_ij j), which names the action between two that are likely).
         trained_as: recipes that agree in it train the same network and read each other's weights.
         some_actions: what changes for tasks that do not take all of the actions; None changes nothing.
         one_view: what changes for pictures of one square view; it goes before `some_actions`.
@@ -43,7 +44,7 @@ class Recipe:
     decoding: Decoding
     train: TrainConfig
     stop: Stop = "head"
-    predicts: Literal["assignment", "independent"] = "assignment"
+    predicts: Prediction = "assignment"
     trained_as: str = ""
     some_actions: Variant | None = None
     one_view: Variant | None = None
@@ -64,21 +65,24 @@ class Recipe:
         one_view = self.one_view if views == 1 and max(height, width) < 2 * min(height, width) else None
         some_actions = self.some_actions if shortest < n_actions else None
         variant = one_view or some_actions or Variant(self.head, self.width)
-        train = (config or self.train.changed(variant.settings)).changed(settings or {})
+        given = {"head": variant.head, "width": variant.width, **(settings or {})}
+        head, neurons = given.pop("head"), given.pop("width")
+        train = (config or self.train.changed(variant.settings)).changed(given)
         if epochs is not None:
             if epochs < 1:
                 raise InputError(f"Expected at least one epoch; got {epochs}.")
             train = replace(train, epochs=epochs, least_steps=0, most_steps=None)
         network = NetworkConfig(
             encoder=encoder,
-            head=variant.head,
+            head=head,
             decoding=self.decoding,
             picture_shape=(views, height, width, colours),
             n_steps=n_steps,
             n_actions=n_actions,
-            width=variant.width,
+            width=neurons,
             temperature=train.temperature if self.decoding == "sinkhorn" else 1.0,
             stop=self.stop if shortest < n_steps else "none",
+            spare_rows=n_actions + 1 - n_steps if head == "tcn-published" and shortest < n_steps else 0,
             iterations=train.iterations if self.decoding == "sinkhorn" and n_steps < n_actions else None,
         )
         return network, train
@@ -104,6 +108,20 @@ _SOME_ACTIONS = Variant("tcn", 32, {"batch": 64, "rate": 4e-3, "most_steps": 220
 # teach a head of glimpses 99% of whole sequences, the temporal one 77%. It wants many small updates.
 _ONE_VIEW = Variant("glimpses", 64, {"batch": 32, "least_steps": 2000, "most_steps": 3300})
 
+# As published (github.com/mgb45/action_permutations, the towers' code): cross-entropy of a softmax of the softmax, an
+# action read as round(sum p id), and integers for Gumbel-Sinkhorn. With neighbouring numbers for blocks of one colour
+# the last is a hint which are alike; numbered apart (0, 3, 1, 4, 2, 5), it is gone.
+_PUBLISHED = replace(_PAPER, loss="rows-twice")
+_BC_PUBLISHED = Recipe("bc-published", "dense", 128, "rows", _PUBLISHED, "class", "expected-number")
+# 128 latent dimensions a step for towers and Soma, 16 for words.
+_TCN_PUBLISHED = replace(
+    _BC_PUBLISHED,
+    name="tcn-published",
+    head="tcn-published",
+    trained_as="",
+    some_actions=Variant("tcn-published", 16),
+)
+
 _BC = Recipe("bc", "dense", 128, "rows", _PAPER, "class", "independent")
 _TCN = Recipe("tcn-paper", "tcn", 16, "rows", _PAPER, "class", "independent")
 _ALL = (
@@ -114,6 +132,19 @@ _ALL = (
     replace(_BC, name="bc+hungarian", predicts="assignment"),
     _TCN,
     replace(_TCN, name="tcn-paper+hungarian", predicts="assignment"),
+    _BC_PUBLISHED,
+    replace(_BC_PUBLISHED, name="bc-published+hungarian", predicts="published-assignment"),
+    _TCN_PUBLISHED,
+    replace(_TCN_PUBLISHED, name="tcn-published+hungarian", predicts="published-assignment"),
+    Recipe(
+        "sinkhorn-published",
+        "dense",
+        128,
+        "sinkhorn",
+        replace(_PAPER, loss="gumbel-sinkhorn-numbers"),
+        "network",
+        "published-assignment",
+    ),
 )
 RECIPES = {recipe.name: recipe for recipe in _ALL}
 

@@ -33,6 +33,9 @@ SINKHORN_FIRST, NEWTON_ROWS, NEWTON_STEPS, NEWTON_EXACT = 12, 64, 100, 1e-7
 #: Widest spread of logits that `scaled_sinkhorn` takes: its scales reach the exponential of about twice as much.
 SAFE_SPREAD = 150.0
 
+#: Largest factor by which a row may be scaled in float32: its square, which a gradient needs, is still a number.
+LARGEST_SCALE = 1e19
+
 
 def log_sinkhorn(
     logits: Tensor, *, tolerance: float | None = TOLERANCE, max_iterations: int = MAX_ITERATIONS
@@ -106,7 +109,29 @@ def gumbel_sinkhorn(
     uniform = torch.rand(shape, generator=generator, dtype=logits.dtype, device=logits.device)
     limits = torch.finfo(logits.dtype)
     gumbel = -torch.log(-torch.log(uniform.clamp(limits.tiny, 1 - limits.eps)))
-    return log_sinkhorn((logits + noise * gumbel) / temperature, tolerance=None, max_iterations=iterations)
+    noisy = (logits + noise * gumbel) / temperature
+    steps, actions = logits.shape[-2:]
+    if steps < actions and steps**iterations < LARGEST_SCALE:
+        return _log_sinkhorn_by_scaling(noisy, iterations)
+    return log_sinkhorn(noisy, tolerance=None, max_iterations=iterations)
+
+
+def _log_sinkhorn_by_scaling(logits: Tensor, iterations: int) -> Tensor:
+    """As `log_sinkhorn` with a slack row and a fixed number of iterations, differentiable; 6 times as fast for 6 x 98.
+
+    It scales the rows and columns of exp(X), each row's largest entry being one. No column vanishes beside the slack
+    row's ones, and an iteration raises a row's factor at most T times, whatever the logits are.
+    """
+    steps, actions = logits.shape[-2:]
+    x = logits - logits.detach().amax(dim=-1, keepdim=True)
+    table = torch.exp(x)
+    down = torch.ones_like(table[..., :1, :])
+    for _ in range(iterations):
+        across = 1 / (table * down).sum(dim=-1, keepdim=True)
+        slack = (actions - steps) / down.sum(dim=-1, keepdim=True)
+        down = 1 / ((table * across).sum(dim=-2, keepdim=True) + slack)
+    # In logarithms the entries that exp() lost are there again.
+    return x + down.log() - torch.log((table * down).sum(dim=-1, keepdim=True))
 
 
 def scaled_sinkhorn(

@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 from neurosym.errors import UnknownNameError
 
-Loss = Literal["gumbel-sinkhorn", "sinkhorn", "rows"]
+Loss = Literal["gumbel-sinkhorn", "gumbel-sinkhorn-numbers", "sinkhorn", "rows", "rows-twice"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -17,7 +17,9 @@ class TrainConfig:
 
     Attributes:
         loss: "gumbel-sinkhorn" (the paper's: samples of the permutation against the demonstration, mean squared
-            error), "sinkhorn" (cross-entropy of log S(X)) or "rows" (cross-entropy of a softmax a step).
+            error), "sinkhorn" (cross-entropy of log S(X)) or "rows" (cross-entropy of a softmax a step). As published:
+            "gumbel-sinkhorn-numbers" (squared error of the expected number, see `numbers`) and "rows-twice" (a softmax
+            of the softmax).
         soft: learn from the demonstrations' marginals where there are some; otherwise from their sequences.
         epochs: passes over the demonstrations.
         least_steps: with few demonstrations, epochs are added until so many updates are made.
@@ -31,6 +33,7 @@ class TrainConfig:
         classes: one integer an action; actions of one class are interchangeable, their probabilities are summed
             before the logarithm. Empty: each is its own.
         sum_classes: take `classes` from the demonstrations where it is empty.
+        numbers: of the actions, where they are learned or read as numbers; empty: 0 to N - 1, as they are listed.
         held_out: share of the groups of demonstrations that is kept from training and only measured.
         keep: "last" or "best", the weights of the epoch with the least held-out loss.
         patience: stop when the held-out loss has not improved for so many epochs; None never stops early.
@@ -56,6 +59,7 @@ class TrainConfig:
     noise: float = 1.0
     classes: tuple[int, ...] = ()
     sum_classes: bool = False
+    numbers: tuple[int, ...] = ()
     held_out: float = 0.0
     keep: Literal["last", "best"] = "last"
     patience: int | None = None
@@ -71,4 +75,4 @@ class TrainConfig:
         return replace(self, **settings)
 
     def to_json(self) -> dict[str, Any]:
-        return {**asdict(self), "classes": list(self.classes)}
+        return {**asdict(self), "classes": list(self.classes), "numbers": list(self.numbers)}

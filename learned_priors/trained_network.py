@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
 
 from learned_priors.metrics import decoded
-from learned_priors.networks import Logits, OrderNetwork
+from learned_priors.networks import Logits, OrderNetwork, Prediction
 from neurosym.errors import InputError
 from neurosym.planning.order_scores import OrderScores
 
@@ -52,23 +53,52 @@ class TrainedNetwork:
             scores += [OrderScores(table, actions, length, self.classes) for table, length in zip(tables, by_table)]
         return scores
 
-    def orders(self, batch: NDArray[np.uint8], *, assigned: bool, sum_classes: bool) -> NDArray[np.int64]:
+    def orders(
+        self,
+        batch: NDArray[np.uint8],
+        *,
+        predicts: Prediction,
+        sum_classes: bool,
+        lengths: NDArray[np.int64] | None = None,
+    ) -> NDArray[np.int64]:
         """The network's own orders: int64 (M, T), -1 after the last step.
 
         Args:
-            assigned: the likeliest number of steps, and the best assignment of actions to them; otherwise the
-                likeliest action of each step by itself, which may be the same twice.
+            predicts: see `learned_priors.recipes.Recipe`.
             sum_classes: sum the probabilities of interchangeable actions before they are assigned.
+            lengths: int64 (M,), the numbers of steps where they are known; None reads them, too.
         """
+        if predicts not in get_args(Prediction):
+            raise InputError(f"Expected how to predict, one of {', '.join(get_args(Prediction))}; got {predicts!r}.")
         classes = self.classes if sum_classes else ()
         orders = [np.empty((0, self.network.config.n_steps), dtype=np.int64)]
         for logits in self._logits(batch):
-            if assigned:
-                table, length = self.network.tables(logits)
+            table, length = self.network.tables(logits)
+            done = sum(len(own) for own in orders)
+            steps = None if lengths is None else lengths[done : done + len(table)]
+            if steps is not None:
+                length = np.where(np.arange(table.shape[1] + 1) == steps[:, None], 0.0, -np.inf)
+            if predicts == "assignment":
                 orders.append(decoded(table, classes, log_length=length))
+                continue
+            if predicts == "independent":
+                order = table.argmax(axis=-1)
+            elif predicts == "published-assignment":
+                order = np.stack([linear_sum_assignment(1 - np.exp(rows))[1] for rows in table])
             else:
-                orders.append(_likeliest_by_step(logits))
+                order = self._nearest_number(table)
+            steps = _likeliest_length(logits) if steps is None else steps
+            order[np.arange(order.shape[1]) >= steps[:, None]] = -1
+            orders.append(order)
         return np.concatenate(orders)
+
+    def _nearest_number(self, table: NDArray[np.float64]) -> NDArray[np.int64]:
+        """Of each step the action whose number is next to the expected one, int64 (B, T)."""
+        numbers = self.header["training"]["config"].get("numbers") or range(table.shape[-1])
+        number = np.asarray(numbers, dtype=np.float64)
+        expected = np.exp(table) @ number
+        nearest: NDArray[np.int64] = np.abs(expected[..., None] - number).argmin(axis=-1)
+        return nearest
 
     def _logits(self, batch: NDArray[np.uint8]) -> Iterator[Logits]:
         """The network's answers, chunk by chunk."""
@@ -80,15 +110,13 @@ class TrainedNetwork:
             yield logits
 
 
-def _likeliest_by_step(logits: Logits) -> NDArray[np.int64]:
-    """Each step by itself: int64 (B, T), -1 from the first step on whose likeliest choice is to stop."""
-    steps, actions = logits.order.shape[1:]
+def _likeliest_length(logits: Logits) -> NDArray[np.int64]:
+    """int64 (B,): the likeliest number of steps, or those before the first whose likeliest choice is to stop."""
     if logits.length is not None:
-        ended = torch.arange(steps, device=logits.order.device) >= logits.length.argmax(dim=-1, keepdim=True)
-        choice = logits.order.argmax(dim=-1)
-    else:
-        stop = [] if logits.stop is None else [logits.stop[..., None]]
-        choice = torch.cat([logits.order, *stop], dim=-1).argmax(dim=-1)
-        ended = (choice == actions).cumsum(dim=-1) > 0
-    order: NDArray[np.int64] = choice.masked_fill(ended, -1).cpu().numpy()
-    return order
+        length: NDArray[np.int64] = logits.length.argmax(dim=-1).cpu().numpy()
+        return length
+    if logits.stop is None:
+        return np.full(logits.order.shape[0], logits.order.shape[1])
+    going = (logits.order.amax(dim=-1) >= logits.stop).cpu().numpy()
+    before_the_stop: NDArray[np.int64] = np.cumprod(going, axis=1, dtype=np.int64).sum(axis=1)
+    return before_the_stop

@@ -16,7 +16,7 @@ soma = ns.load_domain("soma")
 LEARNED = ("sinkhorn", "tcn", "sinkhorn-paper", "tcn-paper")
 
 #: Registered, but without weights for Soma: they are trained where they are compared (tests/test_models.py).
-WITHOUT_WEIGHTS = ("bc", "bc+hungarian")
+WITHOUT_WEIGHTS = ("bc", "bc+hungarian", *(name for name in ns.prior_names() if "-published" in name))
 
 
 @pytest.fixture(scope="module")

@@ -14,10 +14,10 @@ import torch
 
 from learned_priors.encoders import ResNetEncoder, build_encoder
 from learned_priors.heads import log_length_of_stops
-from learned_priors.losses import cross_entropy, loss_of
+from learned_priors.losses import cross_entropy, loss_of, squared_error_of_numbers, targets_of
 from learned_priors.metrics import calibration_error, decoded, step_matches, whole_order_accuracy
 from learned_priors.network_prior import NetworkPrior
-from learned_priors.networks import Logits
+from learned_priors.networks import Logits, NetworkConfig, OrderNetwork
 from learned_priors.recipes import RECIPES
 from learned_priors.sinkhorn import log_sinkhorn
 from learned_priors.train_config import TrainConfig
@@ -129,14 +129,19 @@ def test_every_model_trains_predicts_is_saved_loaded_and_conforms(name: str, kin
     assert orders.shape == test.sequences.shape
     assert np.array_equal(prior.predict(test.pictures[0]), orders[0])
     assert prior.predict(test.pictures[:0]).shape == (0, orders.shape[1])
+    if RECIPES[name].predicts.endswith("assignment"):
+        assert re_used(orders, test) == 0
+    # What is published learns slowly, by a loss that hardly falls; where orders end early, most of all to stop.
+    slowly = "published" in name
     if kind == "identical":
         assert (orders >= 0).all()
-    else:
+    elif not slowly:
         assert stops_right(orders, test) > 0.9
-    if RECIPES[name].predicts == "assignment":
-        assert re_used(orders, test) == 0
     # The paper's masked loss learns the last steps, which few towers reach, slowest.
-    assert colours_right(prior, test) > (0.4 if name == "sinkhorn-paper" else 0.75)
+    if slowly and kind == "identical":  # chance names a third of the colours
+        assert compare_orders(orders, test, test.classes)["per_step"].mean() > 0.4
+    elif not slowly:
+        assert colours_right(prior, test) > (0.4 if name == "sinkhorn-paper" else 0.75)
 
     scores = prior.read(test.pictures)
     for s in scores:
@@ -151,7 +156,7 @@ def test_every_model_trains_predicts_is_saved_loaded_and_conforms(name: str, kin
         assert a.log_length is None or np.array_equal(a.log_length, b.log_length)  # type: ignore[arg-type]
     check_prior(loaded, shown(test), pictures_only=True)  # type: ignore[arg-type]
     steps = [len(s.order()) for s in scores]
-    if kind != "identical":
+    if kind != "identical" and not slowly:
         assert np.mean(np.array(steps) == test.lengths) > 0.9
 
 
@@ -183,6 +188,55 @@ def test_plain_models_use_actions_twice_and_the_same_weights_assigned_do_not(tmp
 def test_re_use_counts_actions_not_padding() -> None:
     orders = np.array([[0, 1, 2], [0, 1, 0], [1, -1, -1], [-1, -1, -1]])
     assert compare_orders(orders, towers(4, (1, 1, 1)), range(3))["re_use"].tolist() == [0, 1, 0, 0]
+
+
+# As published
+
+
+def test_numbers_tell_which_blocks_are_nearly_alike() -> None:
+    target = torch.eye(4)[None]
+    near, far = torch.eye(4)[[1, 0, 2, 3]], torch.eye(4)[[2, 1, 0, 3]]
+
+    def loss(table: torch.Tensor, numbers: tuple[int, ...] = ()) -> float:
+        return float(squared_error_of_numbers(table.log()[None, None], target, numbers))
+
+    assert loss(torch.eye(4)) == 0
+    assert loss(near) == pytest.approx(2 * 1 / 4)
+    assert loss(far) == pytest.approx(2 * 4 / 4)
+    assert loss(near, (0, 2, 1, 3)) == pytest.approx(2 * 4 / 4)
+
+
+def test_a_softmax_of_the_softmax_is_never_sure() -> None:
+    target = torch.eye(6)[None]
+    config = replace(RECIPES["bc-published"].train)
+    sure = loss_of(Logits(50 * target), target, config)
+    assert float(sure) == pytest.approx(np.log(np.e + 5) - 1, abs=1e-5)
+    assert float(loss_of(Logits(50 * target), target, RECIPES["bc"].train)) < 1e-5
+
+
+def test_published_networks_read_the_action_of_the_expected_number() -> None:
+    learn, test = towers(60), towers(40, seed=1)
+    prior = trained("bc-published", learn)
+    chance = np.stack([np.exp(s.log_prob) for s in prior.read(test.pictures)])
+    assert np.array_equal(prior.predict(test.pictures), np.rint(chance @ np.arange(6)).astype(int))
+    apart = trained("bc-published", learn, numbers=(0, 3, 1, 4, 2, 5))
+    expected = np.stack([np.exp(s.log_prob) for s in apart.read(test.pictures)]) @ np.array([0, 3, 1, 4, 2, 5])
+    assert np.array_equal(apart.predict(test.pictures), np.array([0, 2, 4, 1, 3, 5])[np.rint(expected).astype(int)])
+
+
+def test_the_published_temporal_network_has_a_row_and_a_class_more_than_actions() -> None:
+    learn = towers(20, (2, 2, 2, 2), steps=3, shortest=2)
+    prior = trained("tcn-published", learn, least_steps=0)
+    network = OrderNetwork(NetworkConfig.from_json(prior.header["network"]))
+    prepared = network.prepare(torch.from_numpy(learn.pictures[:5]))
+    rows = network.train()(prepared)
+    assert (rows.order.shape, rows.stop.shape) == ((5, 9, 8), (5, 9))  # type: ignore[union-attr]
+    assert network.eval()(prepared).order.shape == (5, 3, 8)
+    target = targets_of(torch.from_numpy(learn.sequences[:5]), 8)
+    (gradient,) = torch.autograd.grad(loss_of(rows, target, prior.recipe.train), rows.stop)  # type: ignore[arg-type]
+    assert (gradient[:, 3:] < 0).all()  # rows that are never read learn to stop
+    with pytest.raises(CheckpointError, match="spare rows"):
+        NetworkConfig.from_json({**prior.header["network"], "spare_rows": -1})
 
 
 # How many steps

@@ -46,7 +46,7 @@ def test_a_killed_experiment_goes_on_and_ends_the_same(tmp_path, monkeypatch):
         lines = list(csv.DictReader(file))
     assert list(lines[0]) == ["experiment", "pictures", "method", "n", "seed", "metric", "value"]
     methods = {line["method"] for line in lines}
-    assert methods == {"random", "sinkhorn-paper", "tcn-paper", "blind"}
+    assert methods == {"random", "outermost-first", "sinkhorn-paper", "tcn-paper", "blind"}
     blind = [float(x["value"]) for x in lines if x["method"] == "blind"]
     assert 0.3 < blind[0] <= 1
     page = (folder / "report.md").read_text()

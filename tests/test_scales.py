@@ -21,8 +21,9 @@ from neurosym.experiments.studies import SCALES, study, study_names
 def test_each_has_demonstrations_enough_and_settings_that_exist(name, scale):
     given = study(name, scale)
     family = ns.load_domain(given.domain)
-    for method in given.methods:
-        assert RECIPES[method].train.changed(given.train.get(method, {}))
+    for method in (*given.methods, *given.controls):
+        prior, settings = given.training(method)
+        assert RECIPES[prior].train.changed({k: v for k, v in settings.items() if k not in ("head", "width")})
     assert set(given.train) <= set(given.methods)
     for n in given.sizes:
         for part, options in (("train", given.options(n)), (given.part, given.test(n))):
@@ -38,13 +39,17 @@ def test_the_paper_scale_has_the_papers_sizes():
     assert study("scrabble", "paper").sizes[:3] + study("scrabble", "paper").sizes[-2:] == (6, 11, 16, 96, 98)
     assert study("scrabble", "paper").test(98)["count"] == 5_000
     assert soma_experiment("paper").splits == 100
+    published = soma_experiment(name="soma-published")
+    assert (published.epochs, published.splits, published.domain, published.name) == (1500, 1, "soma", "soma-published")
+    with pytest.raises(ns.UnknownNameError, match="Did you mean 'soma-published'"):
+        soma_experiment(name="soma-publish")
     for scale in (lambda: study("tower", "papre"), lambda: soma_experiment("papre")):
         with pytest.raises(ns.UnknownNameError, match="Did you mean 'paper'"):
             scale()
 
 
 def test_settings_that_a_study_changes_reach_the_training_and_the_key(tmp_path):
-    given = replace(study("tower"), methods=("bc",), baselines=(), pictures=("easy",), sizes=(6,), seeds=1, figures=())
+    given = replace(study("tower"), methods=("bc",), baselines=(), controls={}, figures=(), sizes=(6,), seeds=1)
     given = replace(given, test=lambda _: {"variant": "colours", "count": 5})
     short, long = (replace(given, train={"bc": {"epochs": n}}) for n in (1, 40))
     reproduce_study(short, tmp_path)

@@ -193,3 +193,20 @@ def test_samples_follow_their_generator() -> None:
     one, same, other = (gumbel_sinkhorn(x, generator=torch.Generator().manual_seed(s)) for s in (1, 1, 2))
     assert torch.equal(one, same)
     assert not torch.equal(one, other)
+
+
+@pytest.mark.parametrize("spread", [1.0, 30.0, 300.0])
+def test_samples_of_few_steps_by_scaling_are_those_in_logarithms(spread):
+    """The same values and gradients, also where exp() underflows; float32, as in training."""
+    x = (spread * torch.randn(3, 6, 40, generator=torch.Generator().manual_seed(0))).requires_grad_()
+    target = torch.eye(40)[:6]
+
+    def gradient(log_prob):
+        (own,) = torch.autograd.grad(((log_prob.exp() - target) ** 2).sum(), x)
+        return own
+
+    samples = gumbel_sinkhorn(x, samples=2, noise=0.0, iterations=20)
+    exact = log_sinkhorn(x, tolerance=None, max_iterations=20).expand(2, -1, -1, -1)
+    torch.testing.assert_close(samples.exp(), exact.exp(), rtol=1e-3, atol=1e-5)
+    torch.testing.assert_close(gradient(samples), gradient(exact), rtol=1e-2, atol=1e-4)
+    torch.testing.assert_close(samples.exp().sum(-1), torch.ones(2, 3, 6))

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from neurosym.experiments.reporting import Row
 
 PLANNERS = ("swap-repair", "backtracking", "best-first")
-PRIORS = ("none", "tcn-paper", "sinkhorn-paper", "tcn", "sinkhorn")
+PRIORS = ("none", "outermost-first", "tcn-paper", "sinkhorn-paper", "tcn", "sinkhorn")
 PARTS = ("test", "train", "all")
 
 

@@ -25,7 +25,11 @@ class Pictures(StrEnum):
 
 def reproduce(
     name: Annotated[
-        str, typer.Argument(metavar="NAME", help="soma, tower, tower-by-sequence, unseen, variable or scrabble.")
+        str,
+        typer.Argument(
+            metavar="NAME",
+            help="soma, soma-published, tower, tower-easy, tower-by-sequence, unseen, variable or scrabble.",
+        ),
     ],
     seeds: Annotated[int | None, typer.Option(min=1, metavar="K", help="Splits and trainings, 0 to K - 1.")] = None,
     scale: Annotated[
@@ -62,15 +66,15 @@ def reproduce(
 
     folder = out or Path("out") / f"reproduce-{name}{'' if scale == 'quick' else f'-{scale}'}"
     given: dict[str, Any] = {"workers": workers, "engine": engine, "address": address, "say": say}
-    if name != "soma" and name not in imitation.study_names():
-        raise UnknownNameError("experiment", name, ["soma", *imitation.study_names()])
+    if name not in (*planning.SOMA_EXPERIMENTS, *imitation.study_names()):
+        raise UnknownNameError("experiment", name, [*planning.SOMA_EXPERIMENTS, *imitation.study_names()])
     # Ray says on stdout that a node is lost; stdout belongs to the answer.
     with redirect_stdout(sys.stderr):
-        if name == "soma":
-            what = planning.soma_experiment(scale)
+        if name in planning.SOMA_EXPERIMENTS:
+            what = planning.soma_experiment(scale, name)
             styles = tuple(style.value for style in pictures or ()) or what.styles
             what = replace(what, splits=seeds or what.splits, styles=styles, methods=tuple(prior or what.methods))
-            what = replace(what, epochs=epochs, repeats=repeats)
+            what = replace(what, epochs=epochs or what.epochs, repeats=repeats)
             with progress_bar("trainings and comparisons") as progress:
                 page = planning.report(what, planning.reproduce(what, folder, progress=progress, **given))
         else:

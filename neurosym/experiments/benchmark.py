@@ -30,6 +30,8 @@ from neurosym.registry import load_domain, load_planner, load_prior
 
 #: The name of planning without a prior, in tables and on the command line.
 NO_PRIOR = "none"
+#: A prior that is not trained and looks at no picture, but at the geometry.
+OUTERMOST = "outermost-first"
 
 #: Raise it whenever the same comparison would give other runs, so that no journal answers for it.
 RUNS_VERSION = 3
@@ -137,8 +139,8 @@ def ask_priors(
     asked = set(comparison.priors) - {NO_PRIOR}
     family = load_domain(comparison.domain)
     problems = [family.problem(n, **comparison.options) for n in comparison.numbers] if asked else []
-    # Whether a prior looks at pictures is its own business; these two are known not to.
-    if asked - {"uniform", "random"}:
+    # Whether a prior looks at pictures is its own business; these are known not to.
+    if asked - {"uniform", "random", OUTERMOST}:
         problems = family.observed(problems, workers=workers, progress=progress)
     for name in comparison.priors:
         try:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from itertools import combinations
 
-from neurosym.experiments.hypotheses import OF_OURS, OF_THE_PAPER
-from neurosym.experiments.studies import Results
+from neurosym.experiments.hypotheses import OF_OURS, OF_THE_PAPER, REASONS
+from neurosym.experiments.study_grid import Results
 
 #: Metrics in which our recipe is set against the paper's, as sentences name them.
 COMPARED = {
@@ -19,13 +19,15 @@ _BASELINES = {"blind": "best fixed answer"}
 def conclusions(results: Results, style: str) -> list[str]:
     """One sentence each, Markdown without bullets."""
     study = results.study
-    sentences = _order(results, style)
+    families = study.families or {"": study.methods}
+    sentences = [s for title, methods in families.items() for s in _order(results, style, title, methods)]
     for metric in COMPARED:
         sentences += _ours_ahead(results, style, metric)
     for baseline in study.baselines:
         for metric in ("whole_sequence", "per_step"):
             sentences += _above(results, style, baseline, metric)
-    for who, hypotheses in (("The paper: ", OF_THE_PAPER), (f"Asked of `{study.ours}`: ", OF_OURS)):
+    sentences += _taken_away(results, style)
+    for who, hypotheses in (("The paper: ", OF_THE_PAPER), ("Why: ", REASONS), (f"Asked of `{study.ours}`: ", OF_OURS)):
         for statement, test in hypotheses.get(study.name, ()):
             if (answer := test(results, style)) is not None:
                 verdict = "holds" if answer[0] else "does not hold"
@@ -33,10 +35,11 @@ def conclusions(results: Results, style: str) -> list[str]:
     return sentences
 
 
-def _order(results: Results, style: str) -> list[str]:
+def _order(results: Results, style: str, title: str, methods: tuple[str, ...]) -> list[str]:
     """Whether the paper's methods come out in the paper's order, pair by pair."""
     study = results.study
-    published = {m: own["whole_sequence"] for m, own in study.published.items() if m in study.methods}
+    there = set(methods) & set(study.methods)
+    published = {m: own["whole_sequence"] for m, own in study.published.items() if m in there}
     if len(published) < 2:
         return []
     ranked = sorted(published, key=lambda m: published[m])
@@ -51,10 +54,15 @@ def _order(results: Results, style: str) -> list[str]:
     ]
     own = " < ".join(f"{m} {means[m]:.3f}" for m in sorted(ranked, key=lambda m: means[m]))
     orders = f"the paper's order: {own} (the paper: {' < '.join(f'{m} {published[m]:.2f}' for m in ranked)})."
+    what = f"{title}: whole sequences" if title else "Whole sequences"
     if not otherwise:
-        return [f"Whole sequences come out in {orders}"]
+        worse, better = min(pairs, key=lambda pair: means[pair[1]] - means[pair[0]])
+        seeds = list(zip(*(results.values(style, m, max(study.sizes), "whole_sequence") for m in (worse, better))))
+        narrowest = f"`{better}` is ahead of `{worse}` by {means[better] - means[worse]:.3f}"
+        in_seeds = f", in {sum(b > a for a, b in seeds)} of {len(seeds)} seeds" if len(seeds) > 1 else ""
+        return [f"{what} come out in {orders} All {len(pairs)} pairs do; the narrowest: {narrowest}{in_seeds}."]
     return [
-        f"Whole sequences do **not** come out in {orders} {len(pairs) - len(otherwise)} of its {len(pairs)} pairs do; "
+        f"{what} do **not** come out in {orders} {len(pairs) - len(otherwise)} of its {len(pairs)} pairs do; "
         f"otherwise: {'; '.join(otherwise)}."
     ]
 
@@ -82,6 +90,18 @@ def _ours_ahead(results: Results, style: str, metric: str) -> list[str]:
     verbs = {"is ahead": ahead, "is **not** ahead": behind}
     name = COMPARED[metric]
     return [f"`{study.ours}` {v} of each of the paper's in {name} ({' | '.join(at)})." for v, at in verbs.items() if at]
+
+
+def _taken_away(results: Results, style: str) -> list[str]:
+    """What is left of ours when one thing is taken away alone."""
+    study, n = results.study, max(results.study.sizes)
+    whole = results.mean(style, study.ours, n, "whole_sequence")
+    own = {what: control for what, control in study.controls.items() if control.of == study.ours}
+    left = {what: mean for what in own if (mean := results.mean(style, what, n, "whole_sequence")) is not None}
+    if whole is None or not left:
+        return []
+    parts = ", ".join(f"{what} {mean:.3f}" for what, mean in sorted(left.items(), key=lambda pair: pair[1]))
+    return [f"`{study.ours}` reads {whole:.3f} of the sequences; with one thing changed: {parts}."]
 
 
 def _above(results: Results, style: str, baseline: str, metric: str) -> list[str]:

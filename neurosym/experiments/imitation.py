@@ -10,6 +10,7 @@ from collections.abc import Callable
 from dataclasses import asdict
 from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from neurosym import __version__
@@ -17,7 +18,8 @@ from neurosym.experiments.baselines import BASELINES
 from neurosym.experiments.engines import run_tasks
 from neurosym.experiments.journal import Journal, key_of
 from neurosym.experiments.order_accuracy import Counts, averages, classes_of, compare_orders, seen_in
-from neurosym.experiments.studies import Results, Study, Trial, study, study_names
+from neurosym.experiments.studies import study, study_names
+from neurosym.experiments.study_grid import Results, Study, Trial
 from neurosym.experiments.study_report import report, write_results
 from neurosym.language.problem_family import Progress
 from neurosym.registry import load_domain, load_prior
@@ -25,7 +27,7 @@ from neurosym.registry import load_domain, load_prior
 __all__ = ["Results", "Study", "Trial", "report", "reproduce_study", "run_trial", "study", "study_names"]
 
 #: Raise it whenever the same trial would give other figures, so that no journal answers for it.
-TRIALS_VERSION = 3
+TRIALS_VERSION = 4
 
 
 def reproduce_study(
@@ -72,7 +74,8 @@ def run_trial(trial: Trial, given: Study, epochs: int | None = None) -> dict[str
         `Counts.to_json` gives them (None for a baseline).
     """
     family = load_domain(given.domain)
-    learner: Any = None if trial.method in BASELINES else load_prior(trial.method)
+    name, changes = given.training(trial.method)
+    learner: Any = None if trial.method in BASELINES else load_prior(name)
     common: dict[str, Any] = {"split": trial.seed, "style": trial.pictures, "seed": trial.seed}
     recipe = "paper" if learner is None else getattr(learner, "labels", "full")
     train = family.demonstrations("train", recipe=recipe, **common, **given.options(trial.n))
@@ -80,20 +83,45 @@ def run_trial(trial: Trial, given: Study, epochs: int | None = None) -> dict[str
     seen = seen_in(train, test)
     if learner is None:
         return {"figures": averages(BASELINES[trial.method](train, test), seen), "counts": None}
-    changes = given.train.get(trial.method)
-    learner.fit(train, seed=trial.seed, epochs=epochs, **({"settings": changes} if changes else {}))
+    # What reads the same network in another way (with an assignment, without) has it from the shelf.
+    shared = {"trained_as": getattr(learner, "trained_as", name), **_configuration(given, trial, epochs)}
+    kept = Path(_shelf().name) / f"{key_of({**shared, 'recipe': None, 'method': None})}.safetensors"
+    if kept.exists():
+        learner = load_prior(name, weights=kept)
+    else:
+        learner.fit(train, seed=trial.seed, epochs=epochs, **({"settings": changes} if changes else {}))
+        learner.save(kept)
     orders = learner.predict(test.pictures)
     figures = averages(compare_orders(orders, test, classes_of(test)), seen)
-    figures["training_seconds"] = float(learner.header["training"]["seconds"])
+    if len(set(test.lengths)) > 1:
+        given_lengths = learner.predict(test.pictures, lengths=test.lengths)
+        own = compare_orders(given_lengths, test, classes_of(test))["per_step"]
+        figures["per_step_given_length"] = float(own.mean())
+    training = learner.header["training"]
+    figures |= {"training_seconds": float(training["seconds"]), "epochs": float(training["epochs"])}
     return {"figures": figures, "counts": Counts.of(orders, test).to_json()}
 
 
 def _key(given: Study, trial: Trial, epochs: int | None) -> str:
     """A digest of all that decides a trial."""
-    data = [given.domain, given.part, given.options(trial.n), given.test(trial.n)]
-    training = [_settings(trial.method), dict(given.train.get(trial.method, {})), epochs]
-    version = [__version__, TRIALS_VERSION]
-    return key_of({"trial": asdict(trial), "data": data, "training": training, "version": version})
+    return key_of(_configuration(given, trial, epochs))
+
+
+def _configuration(given: Study, trial: Trial, epochs: int | None) -> dict[str, Any]:
+    name, changes = given.training(trial.method)
+    return {
+        **asdict(trial),
+        "data": [given.domain, given.part, given.options(trial.n), given.test(trial.n)],
+        "recipe": _settings(name),
+        "changes": [changes, epochs],
+        "version": [__version__, TRIALS_VERSION],
+    }
+
+
+@cache
+def _shelf() -> TemporaryDirectory[str]:
+    """Where this process keeps the networks that it trained."""
+    return TemporaryDirectory(prefix="neurosym-")
 
 
 @cache

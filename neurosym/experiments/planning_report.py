@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 
 from neurosym import __version__
-from neurosym.experiments.benchmark import Outcome
+from neurosym.experiments.benchmark import OUTERMOST, Outcome
 from neurosym.experiments.reporting import (
     Drawn,
     figure_of,
@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 PAPERS_PLANNER = "swap-repair"
 #: Named like this in results.csv: the order that fails least on the training half.
 BLIND = "blind"
+#: What stands beside the methods.
+_BESIDE = (BLIND, "random", OUTERMOST)
 #: What must be known of the paper's figures.
 _NOTES = {
     "soma": " The paper prints 51.55 and 54.95 as per cent; its authors' published evaluation suggests that these are "
@@ -67,7 +69,7 @@ def _figures(
 
 def methods_figure(experiment: Experiment, records: pd.DataFrame, style: str) -> Figure:
     """Initial failures, and iterations with every planner: a row a method, a dot a split."""
-    rows, paper = [*experiment.methods, "random", BLIND], _published(experiment)
+    rows, paper = [*experiment.methods, *_BESIDE[::-1]], _published(experiment)
     known = values_by(records, "pictures", "method", "metric")
 
     def values(metric: str, scale: float = 1) -> dict[str, list[float]]:
@@ -91,15 +93,16 @@ def report(experiment: Experiment, records: pd.DataFrame, drawn: Sequence[Drawn]
         drawn: figures that lie beside the page, named after their style of pictures.
     """
     lines = [
-        f"# {experiment.domain}",
+        f"# {experiment.name}",
         "",
         f"The paper's Sec. IV-D, Table II. {_splits(experiment)} at random: trained on one half, tested on the "
         "other. Mean over splits ± deviation between splits; iterations are refusals before the plan. The paper's "
         "deviation is over problems and splits, its iterations those of swap repair. Blind is the fixed order that "
-        "fails least on the training half: it looks at no picture." + _NOTES.get(experiment.domain, ""),
+        "fails least on the training half: it looks at no picture. `outermost-first` knows the geometry and needs no "
+        f"training; the others have pictures alone.{_trained(experiment)}" + _NOTES.get(experiment.domain, ""),
     ]
     for style in experiment.styles:
-        lines += ["", f"## {experiment.domain}: {style} pictures", ""]
+        lines += ["", f"## {experiment.name}: {style} pictures", ""]
         lines += [*(f"* {sentence}" for sentence in conclusions(experiment, records, style)), ""]
         lines += _table(experiment, records, style)
         for figure in drawn:
@@ -113,7 +116,7 @@ def _table(experiment: Experiment, records: pd.DataFrame, style: str) -> list[st
     published, known = _published(experiment), values_by(records, "pictures", "method", "metric")
     columns = ["initial failures %", *(f"iterations, {p}" for p in experiment.planners), "training s"]
     lines = [["method", *columns, "paper: failures %", "paper: iterations"]]
-    for method in (BLIND, "random", *experiment.methods):
+    for method in (*_BESIDE, *experiment.methods):
         papers = [published.get(method, {}).get(key) for key in ("initial_failures", "iterations")]
         row = [
             spread(known.get((style, method, "initial_failures"), ()), 1, scale=100),
@@ -134,7 +137,7 @@ def conclusions(experiment: Experiment, records: pd.DataFrame, style: str) -> li
     known = values_by(records, "pictures", "method", "metric")
     sentences = []
     for metric, key, name, scale in measured:
-        rows = (BLIND, "random", *experiment.methods)
+        rows = (*_BESIDE, *experiment.methods)
         own = {m: scale * float(np.mean(values)) for m in rows if (values := known.get((style, m, metric)))}
         sentences += _against_the_paper(experiment, own, key, name)
         if BLIND in own:
@@ -165,6 +168,10 @@ def _against_the_paper(experiment: Experiment, own: Mapping[str, float], key: st
                 f"{theirs[best]:.2f}."
             )
     return sentences
+
+
+def _trained(experiment: Experiment) -> str:
+    return "" if experiment.epochs is None else f" Each network is trained for {experiment.epochs:,} epochs."
 
 
 def _splits(experiment: Experiment) -> str:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from neurosym.experiments.benchmark import NO_PRIOR, Outcome
+from neurosym.experiments.benchmark import NO_PRIOR, OUTERMOST, Outcome
 from neurosym.plotting import iterations_figure, save_both
 from neurosym.registry import load_domain
 from neurosym.support.files import write_text
@@ -139,6 +139,8 @@ def report(outcome: Outcome) -> str:
     if outcome.image_blind is not None:
         order, failures = " ".join(outcome.image_blind_order), 100 * outcome.image_blind
         text += f" The best fixed order ({order}), which looks at no picture, fails on {failures:.1f}%."
+    if OUTERMOST in comparison.priors:
+        text += f" `{OUTERMOST}` knows the geometry and needs no training."
     return f"{markdown(rows(outcome))}\n{text} {provenance()}\n"
 
 

@@ -15,7 +15,7 @@ LARGEST = 60_000
 PALETTES = (256, 128, 64, 32)
 
 #: The paper's experiments as the paper has them; others come after, by name.
-ORDER = ("tower", "tower-by-sequence", "unseen", "variable", "soma", "scrabble")
+ORDER = ("tower", "tower-easy", "tower-by-sequence", "unseen", "variable", "soma", "soma-published", "scrabble")
 
 _IMAGE = re.compile(r"!\[(?P<caption>[^\]]*)\]\((?P<file>[^)/:]+\.png)\)")
 _LINK = re.compile(r"(?<!!)\[(?P<text>[^\]]*)\]\((?P<file>[^)/:]+\.(?:png|svg|csv))\)")

@@ -11,7 +11,7 @@ from typing import Any
 from neurosym import __version__, plotting
 from neurosym.experiments.conclusions import conclusions
 from neurosym.experiments.reporting import Drawn, markdown_table, provenance, spread, write_experiment
-from neurosym.experiments.studies import Results
+from neurosym.experiments.study_grid import Results
 from neurosym.plotting import Curves, Panel, Spread
 
 #: Classes above which each method's confusion matrix is a figure of its own.
@@ -22,10 +22,14 @@ _METRICS = {
     "whole_sequence_unseen": "whole, unseen",
     "per_step": "per step",
     "per_step_unseen": "per step, unseen",
+    "per_step_given_length": "per step, length given",
     "stop_accuracy": "stop accuracy",
     "re_use": "re-use",
+    "epochs": "epochs",
     "training_seconds": "training s",
 }
+#: Decimals in tables, where not three.
+_DIGITS = {"training_seconds": 1, "epochs": 0}
 _BASELINES = {
     "memoriser": "The memoriser is perfect on sequences that were demonstrated and guesses a random order of the right "
     "length in others; these are expectations.",
@@ -57,6 +61,7 @@ def report(results: Results, drawn: Sequence[Drawn] = ()) -> str:
     for style in study.pictures:
         lines += ["", f"## {study.name}: {style} pictures", "", *(f"* {s}" for s in conclusions(results, style)), ""]
         lines += _table(results, style)
+        lines += _controls(results, style)
     for figure in drawn:
         if figure.shown:
             lines += ["", f"![{figure.caption}]({figure.name}.png)"]
@@ -75,9 +80,23 @@ def _table(results: Results, style: str) -> list[str]:
     lines = [[study.what, "method", *(_METRICS[m] for m in metrics), *papers]]
     for n in study.sizes:
         for method in study.rows:
-            means = [spread(results.values(style, method, n, m), 1 if "seconds" in m else 3) for m in metrics]
+            means = [spread(results.values(style, method, n, m), _DIGITS.get(m, 3)) for m in metrics]
             lines.append([str(n), method, *means, *(_published(study.published.get(method)) if papers else ())])
     return markdown_table(lines)
+
+
+def _controls(results: Results, style: str) -> list[str]:
+    """A table of what changes when one thing of a method does."""
+    study = results.study
+    if not study.controls:
+        return []
+    metrics = ("whole_sequence", "whole_sequence_unseen", "per_step", "training_seconds")
+    lines = [[study.what, "method", "one thing changed", *(_METRICS[m] for m in metrics)]]
+    for n in study.sizes:
+        for what, control in study.controls.items():
+            means = [spread(results.values(style, what, n, m), _DIGITS.get(m, 3)) for m in metrics]
+            lines.append([str(n), control.of, what, *means])
+    return ["", "The same with one thing changed, and all else left as it is:", "", *markdown_table(lines)]
 
 
 def _published(own: Mapping[str, float] | None) -> tuple[str, str]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from neurosym.plotting.style import COLUMN, SMALL, TITLE, add_legend, look_of, mark, papers_mark, tidy
+from neurosym.plotting.style import COLUMN, SMALL, TITLE, add_legend, look_of, mark, narrow, papers_mark, tidy
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -52,7 +52,8 @@ def density_figure(
         _steps(over_sequences, level, right[method], colour)
         for axis in (over_seeds, over_sequences):
             axis.axhline(level, color="0.75", lw=0.5, zorder=1)
-    over_seeds.set_yticks([level + 0.3 for level in range(len(methods))], methods[::-1], fontsize=SMALL)
+    middles = [level + 0.3 for level in range(len(methods))]
+    over_seeds.set_yticks(middles, [narrow(m) for m in methods[::-1]], fontsize=SMALL)
     over_seeds.set_ylim(-0.1, len(methods))
     over_seeds.set_xlim(-0.02, 1.02)
     over_seeds.set_xticks([0, 0.5, 1], ["0", ".5", "1"])

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from neurosym.plotting.style import COLUMN, SMALL, TITLE, add_legend, look_of, tidy
+from neurosym.plotting.style import COLUMN, SMALL, TITLE, add_legend, look_of, narrow, tidy
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -55,7 +55,7 @@ def confusion_figure(title: str, labels: Sequence[str], confusion: Counts) -> Fi
         shares = _by_row(own[: len(names), : len(names)])
         axis.imshow(shares, cmap="Blues", norm=PowerNorm(0.5, vmin=0, vmax=1))
         _name_classes(axis, names, many, first_column=k % columns == 0, last_row=k + columns >= len(confusion))
-        axis.set_title(method, fontsize=6.5, pad=3)
+        axis.set_title(narrow(method), fontsize=6.5, pad=3)
         if not many:
             write_shares(axis, shares)
     figure.suptitle(title, fontsize=TITLE)

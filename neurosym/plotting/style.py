@@ -41,6 +41,11 @@ LOOKS = MappingProxyType(
         "tcn-paper": Look("#E69F00", "s"),
         "tcn-paper+hungarian": Look("#D55E00", "D"),
         "sinkhorn-paper": Look("#009E73", "P"),
+        "bc-published": Look("#56B4E9", "1", ":"),
+        "bc-published+hungarian": Look("#0072B2", "2", ":"),
+        "tcn-published": Look("#E69F00", "<", ":"),
+        "tcn-published+hungarian": Look("#D55E00", ">", ":"),
+        "sinkhorn-published": Look("#009E73", "*", ":"),
         "tcn": Look("#CC79A7", "X"),
         "sinkhorn": Look("#000000", "o"),
         "memoriser": Look("0.35", "", "--"),
@@ -54,6 +59,11 @@ _OTHERS = (Look("#CC79A7", "<"), Look("#7f7f7f", ">"), Look("#0072B2", "*"), Loo
 def look_of(method: str, position: int = 0) -> Look:
     """How a method is drawn; others than the known ones by their position."""
     return LOOKS.get(method) or _OTHERS[position % len(_OTHERS)]
+
+
+def narrow(method: str) -> str:
+    """A method's name, a long one in two lines."""
+    return method.replace("+", "\n+") if len(method) > 16 else method
 
 
 def tidy(axis: Axes, *, sides: tuple[str, ...] = ("top", "right")) -> None:
