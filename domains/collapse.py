@@ -19,7 +19,6 @@ from functools import cache
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from neurosym.errors import AssemblyError
 from neurosym.geometry.assembly import Assembly
@@ -32,6 +31,7 @@ from neurosym.geometry.shapes import Box
 from neurosym.language import Derived, Fluent, State
 from neurosym.language.formulas import AnyOf, Way
 from neurosym.language.search_problem import Verdict
+from neurosym.support.arrays import Array
 from neurosym.support.bitsets import bits
 
 RULES = ("cubes", "strict", "rigid")
@@ -144,7 +144,7 @@ def _settled(world: Assembly, there: int) -> dict[int, float]:
     """Heights (z of the centre) at which the cubes of the pieces in `there` come to rest, lowest first."""
     edge = world.smallest_extent
     cubes = [int(c) for c in np.argsort(world.X_WB[:, 2, 3], kind="stable") if there >> int(world.owners[c]) & 1]
-    poses: dict[int, NDArray[np.float64]] = {}
+    poses: dict[int, Array] = {}
     for cube in cubes:
         pose = world.X_WB[cube].copy()
         under = [poses[c] for c in poses if drops_onto(world, cube, c, poses[c])]

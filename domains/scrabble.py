@@ -13,7 +13,6 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from domains import scrabble_tiles
 from domains.scrabble_demonstrations import demonstrate, picture_seed
@@ -25,6 +24,7 @@ from neurosym.geometry.step_motion import StepMotion
 from neurosym.language import Atom, Problem
 from neurosym.language.demonstrations import Demonstrations
 from neurosym.language.problem_family import ProblemFamily, Progress
+from neurosym.support.arrays import Pixels
 
 #: How many problems of a part are meant where nobody says how many: enough for `compare`, and for its blind baseline.
 DEFAULT_COUNTS = {"train": 50, "test": 200}
@@ -128,7 +128,7 @@ class ScrabbleFamily(ProblemFamily):
         """The first `count` problems of a part (default: see `numbers`), with the options of `problem`."""
         return [self.problem(n, **options) for n in self.numbers(part, split=split, count=count)]
 
-    def observe(self, problem: Problem) -> NDArray[np.uint8]:
+    def observe(self, problem: Problem) -> Pixels:
         from domains.scrabble_drawing import draw_word, style_named
 
         details = problem.details
@@ -141,7 +141,7 @@ class ScrabbleFamily(ProblemFamily):
 
     def pictures(
         self, problem: Problem, *, style: str = "easy", rng: np.random.Generator | None = None
-    ) -> NDArray[np.uint8]:
+    ) -> Pixels:
         """One view of the word, uint8 (1, 32, 192, 3)."""
         from domains.scrabble_drawing import draw_word, style_named
 
@@ -149,7 +149,7 @@ class ScrabbleFamily(ProblemFamily):
 
     def take_pictures(
         self, problems: Sequence[Problem], *, style: str, workers: int = 1, progress: Progress | None = None
-    ) -> NDArray[np.uint8]:
+    ) -> Pixels:
         """Pictures of many problems, from disk where they were taken before."""
         from domains.scrabble_pictures import cached_pictures
 

@@ -18,6 +18,7 @@ from domains.scrabble_tiles import COUNTS, LONGEST
 from neurosym.errors import UnknownNameError
 from neurosym.language.demonstrations import Demonstrations
 from neurosym.language.problem_family import Progress
+from neurosym.support.arrays import Numbers
 
 RECIPES = ("full", "paper")
 
@@ -57,7 +58,7 @@ def demonstrate(
     )
 
 
-def _demonstrated(word: str, names: Sequence[str], seed: Sequence[int]) -> NDArray[np.int64]:
+def _demonstrated(word: str, names: Sequence[str], seed: Sequence[int]) -> Numbers:
     """int64 (6,): for each letter one of its tiles, drawn at random, none twice; -1 after the end."""
     order = [int(a) for a in np.random.default_rng(seed).permutation(len(names))]
     sequence = np.full(LONGEST, -1, dtype=np.int64)

@@ -10,7 +10,6 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from domains.collapse import RULES, check_cubes, check_overlaps, check_standing, keeps_standing
 from domains.soma_demonstrations import check_seed, demonstrate, picture_seed
@@ -22,6 +21,7 @@ from neurosym.language import Action, Domain, Fluent, Problem, Simulation, Type,
 from neurosym.language.demonstrations import Demonstrations
 from neurosym.language.problem import as_names
 from neurosym.language.problem_family import ProblemFamily, Progress
+from neurosym.support.arrays import Pixels
 
 piece = Type("piece")
 present = Fluent("present", piece)
@@ -198,19 +198,19 @@ class SomaFamily(ProblemFamily):
         """The cubes of a part, with the options of `problem`."""
         return [self.problem(n, **options) for n in self.numbers(part, split=split)]
 
-    def observe(self, problem: Problem) -> NDArray[np.uint8]:
+    def observe(self, problem: Problem) -> Pixels:
         rng = np.random.default_rng(problem.details["seed"])
         return render_views(problem.world, problem.details["pictures"], rng)
 
     def pictures(
         self, problem: Problem, *, style: str = "clean", rng: np.random.Generator | None = None
-    ) -> NDArray[np.uint8]:
+    ) -> Pixels:
         """Four views, top and three sides: uint8 (4, 64, 64, 3)."""
         return render_views(problem.world, style, rng or np.random.default_rng(0))
 
     def take_pictures(
         self, problems: Sequence[Problem], *, style: str, workers: int = 1, progress: Progress | None = None
-    ) -> NDArray[np.uint8]:
+    ) -> Pixels:
         """Pictures of many problems, from disk where they were taken before."""
         from neurosym.simulation.picture_cache import cached_pictures
 
@@ -246,11 +246,11 @@ class SomaFamily(ProblemFamily):
         return sum(counts), min(counts), max(counts)
 
 
-def render_views(assembly: Assembly, style: str, rng: np.random.Generator) -> NDArray[np.uint8]:
+def render_views(assembly: Assembly, style: str, rng: np.random.Generator) -> Pixels:
     """Top and three sides, uint8 (4, 64, 64, 3)."""
     from neurosym.simulation import render  # loads PyBullet
 
-    views: NDArray[np.uint8] = render.render_views(assembly, style=style, rng=rng)
+    views: Pixels = render.render_views(assembly, style=style, rng=rng)
     return views
 
 

@@ -24,6 +24,7 @@ from neurosym.language.problem_family import Progress
 from neurosym.language.search_problem import Step
 from neurosym.planning.planner import OrderCounter
 from neurosym.registry import load_planner
+from neurosym.support.arrays import Array, Numbers
 from neurosym.support.disk_cache import cache_folder, load, store
 
 if TYPE_CHECKING:
@@ -116,7 +117,7 @@ def habit(problem: Problem) -> tuple[str, ...]:
 
 def _labels(
     family: SomaFamily, cells: Mapping[str, tuple[Cell, ...]]
-) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+) -> tuple[Numbers, NDArray[np.float32]]:
     """For a cube in its 48 poses: the demonstrator's orders, int64 (48, 7), and the shares, float32 (48, 7, 7)."""
     key = hashlib.sha256(repr((LABELS_VERSION, sorted(cells.items()))).encode()).hexdigest()
     folder = cache_folder() / "soma-labels"
@@ -131,10 +132,10 @@ def _labels(
 
 def _count_labels(
     family: SomaFamily, cells: dict[str, tuple[Cell, ...]]
-) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+) -> tuple[Numbers, NDArray[np.float32]]:
     """Gravity tells only which way is up, so six problems answer for 48 poses."""
     swap = [LETTERS.index({"A": "B", "B": "A"}.get(name, name)) for name in LETTERS]
-    known: dict[tuple[int, ...], tuple[NDArray[np.int64], NDArray[np.float64]]] = {}
+    known: dict[tuple[int, ...], tuple[Numbers, Array]] = {}
     orders = np.zeros((48, 7), dtype=np.int64)
     shares = np.zeros((48, 7, 7), dtype=np.float32)
     counter = load_planner("exhaustive")

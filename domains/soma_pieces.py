@@ -11,6 +11,8 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from neurosym.support.arrays import Numbers
+
 Cell = tuple[int, int, int]
 
 #: Letter -> cells. A and B are mirror images of each other.
@@ -31,7 +33,7 @@ MIRRORED: dict[str, str] = {"A": "B", "B": "A"}
 
 
 @cache
-def symmetries() -> NDArray[np.int64]:
+def symmetries() -> Numbers:
     """int64 (48, 3, 3): the symmetries of the cube as matrices; the 24 rotations first, the identity first of all."""
     found = []
     for permutation in ((0, 1, 2), (1, 2, 0), (2, 0, 1), (0, 2, 1), (1, 0, 2), (2, 1, 0)):
@@ -43,7 +45,7 @@ def symmetries() -> NDArray[np.int64]:
 
 
 def turned(
-    cells: dict[str, tuple[Cell, ...]], symmetry: NDArray[np.int64], side: int = 3
+    cells: dict[str, tuple[Cell, ...]], symmetry: Numbers, side: int = 3
 ) -> dict[str, tuple[Cell, ...]]:
     """A cube's pieces under a symmetry of the cube; under a reflection A and B change names."""
     mirrored = np.linalg.det(symmetry) < 0
@@ -55,7 +57,7 @@ def turned(
     return {name: found[name] for name in cells}
 
 
-def _placements(cells: tuple[Cell, ...], side: int) -> list[NDArray[np.int64]]:
+def _placements(cells: tuple[Cell, ...], side: int) -> list[Numbers]:
     """Every way to put a piece into the cube, as sorted indices of cells."""
     seen = set()
     for rotation in symmetries()[:24]:

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from domains import tower_rules as rules
 from domains.tower_blocks import COLOURS, Block, ReferenceTower
@@ -25,6 +25,7 @@ from neurosym.geometry.step_motion import StepMotion
 from neurosym.language import Problem
 from neurosym.language.demonstrations import Demonstrations
 from neurosym.language.problem_family import ProblemFamily, Progress
+from neurosym.support.arrays import Pixels
 
 
 class TowerFamily(ProblemFamily):
@@ -138,7 +139,7 @@ class TowerFamily(ProblemFamily):
         numbers = self.numbers(part, split=split, variant=variant, by=by)
         return [self.problem(n, variant=variant, **options) for n in numbers]
 
-    def observe(self, problem: Problem) -> NDArray[np.uint8]:
+    def observe(self, problem: Problem) -> Pixels:
         return take_picture(problem.world, problem.details["pictures"], np.random.default_rng(problem.details["seed"]))
 
     def staging(self, problem: Problem, plan: Sequence[str], motions: Sequence[StepMotion | None]) -> Staging:
@@ -149,13 +150,13 @@ class TowerFamily(ProblemFamily):
 
     def pictures(
         self, problem: Problem, *, style: str = "easy", rng: np.random.Generator | None = None
-    ) -> NDArray[np.uint8]:
+    ) -> Pixels:
         """One view from the side, uint8 (1, 64, 64, 3), of the tower as it is; `style` says how it is pictured."""
         return take_picture(problem.world, style, rng or np.random.default_rng(0))
 
     def take_pictures(
         self, problems: Sequence[Problem], *, style: str, workers: int = 1, progress: Progress | None = None
-    ) -> NDArray[np.uint8]:
+    ) -> Pixels:
         """Pictures of many problems, from disk where they were taken before."""
         worlds, seeds = [p.world for p in problems], [p.details["seed"] for p in problems]
         return take_pictures(worlds, seeds, style=style, workers=workers, progress=progress)

@@ -7,15 +7,15 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from neurosym.errors import AssemblyError, UnknownNameError
 from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.queries import AssemblyGeometry
 from neurosym.geometry.rigid_motions import shifted
 from neurosym.geometry.shapes import boxes_part
+from neurosym.support.arrays import Array
 
-Array = NDArray[np.float64]
 #: What makes blocks interchangeable: a colour and a size (width along x, depth along y, height).
 Kind = tuple[str, tuple[float, float, float]]
 

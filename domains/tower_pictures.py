@@ -14,18 +14,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from domains.tower_blocks import COLOURS, ReferenceTower
 from neurosym.errors import UnknownNameError
 from neurosym.language.problem_family import Progress
-
-if TYPE_CHECKING:
-    from neurosym.simulation.looks import Camera, Style
-    from neurosym.simulation.scene import Scene
+from neurosym.simulation.looks import Camera, Style
+from neurosym.simulation.scene import Scene
+from neurosym.support.arrays import Array, Pixels
 
 #: Other families' names for the settings.
 ALIASES = {"clean": "easy", "varied": "hard"}
@@ -69,16 +66,16 @@ def picture_seed(seed: int, variant: str, number: int) -> int:
     return int(np.random.SeedSequence([seed, *variant.encode(), number]).generate_state(1)[0])
 
 
-def draw_offsets(setting: str, n_levels: int, seed: int) -> NDArray[np.float64]:
+def draw_offsets(setting: str, n_levels: int, seed: int) -> Array:
     """Where a tower of cubes of edge one has its levels: float64 (n_levels, 2), off the plumb line along x and y."""
     most = SETTINGS[setting_named(setting)]
     rng = np.random.default_rng([_OFFSET_STREAM, seed])
     shift, lean = rng.uniform(-most.shift, most.shift, 2), most.lean * _in_disc(rng, 1)
-    offsets: NDArray[np.float64] = shift + lean * np.arange(n_levels)[:, None] + most.jitter * _in_disc(rng, n_levels)
+    offsets: Array = shift + lean * np.arange(n_levels)[:, None] + most.jitter * _in_disc(rng, n_levels)
     return offsets
 
 
-def _in_disc(rng: np.random.Generator, n: int) -> NDArray[np.float64]:
+def _in_disc(rng: np.random.Generator, n: int) -> Array:
     """Points drawn uniformly from the unit disc, float64 (n, 2)."""
     radius, angle = np.sqrt(rng.random(n)), rng.uniform(0, 2 * np.pi, n)
     return np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1)
@@ -91,7 +88,7 @@ def take_pictures(
     style: str,
     workers: int = 1,
     progress: Progress | None = None,
-) -> NDArray[np.uint8]:
+) -> Pixels:
     """One picture a tower, uint8 (n, 1, 64, 64, 3), from disk where it was taken before."""
     from neurosym.simulation.picture_cache import cached_pictures
 
@@ -99,7 +96,7 @@ def take_pictures(
     return cached_pictures(jobs, style=look(style), workers=workers, progress=progress, cameras=cameras())
 
 
-def take_picture(tower: ReferenceTower, style: str, rng: np.random.Generator) -> NDArray[np.uint8]:
+def take_picture(tower: ReferenceTower, style: str, rng: np.random.Generator) -> Pixels:
     """The picture of one tower, uint8 (1, 64, 64, 3)."""
     from neurosym.simulation.render import PictureStudio  # loads PyBullet
 

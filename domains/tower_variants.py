@@ -12,10 +12,10 @@ import itertools
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from domains.tower_blocks import COLOURS, Block
 from neurosym.errors import InputError, UnknownNameError
+from neurosym.support.arrays import Truths
 
 VARIANTS = ("colours", "unique", "heights")
 #: Levels of the tallest tower.
@@ -98,7 +98,7 @@ def split_numbers(variant: str, part: str, split: int, by: str) -> tuple[int, ..
 
 
 @cache
-def _trains(variant: str, split: int, by: str) -> NDArray[np.bool_]:
+def _trains(variant: str, split: int, by: str) -> Truths:
     """bool (n_towers,): which towers are to train.
 
     The towers of six levels among ``heights`` are those of ``colours``, and go where these go: what was trained on the
@@ -116,5 +116,5 @@ def _trains(variant: str, split: int, by: str) -> NDArray[np.bool_]:
         free = np.unique(ids[~tall])
     rng = np.random.default_rng([_SPLIT_STREAM, VARIANTS.index(variant), DIVIDED.index(by), split])
     divided[rng.permutation(free)[: round(TRAIN_SHARE * len(free))]] = True
-    found: NDArray[np.bool_] = divided[ids]
+    found: Truths = divided[ids]
     return found

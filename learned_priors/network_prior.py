@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self, overload
+from typing import Any, Self, overload
 
 import numpy as np
 import torch
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from learned_priors.checkpoints import save_network
 from learned_priors.recipes import Recipe, recipe_named
@@ -19,11 +19,10 @@ from learned_priors.training import FitProgress, fit
 from learned_priors.weight_files import WeightStore
 from neurosym.errors import InputError
 from neurosym.language.demonstrations import Demonstrations
+from neurosym.language.problem import Problem
 from neurosym.planning.order_scores import OrderScores
 from neurosym.planning.prior import Prior, as_picture_batch
-
-if TYPE_CHECKING:
-    from neurosym.language.problem import Problem
+from neurosym.support.arrays import Numbers, Pixels
 
 
 class NetworkPrior(Prior):
@@ -78,7 +77,7 @@ class NetworkPrior(Prior):
         return dict(self._weights.own.header) if self._weights.own else {}
 
     @overload
-    def read(self, pictures: NDArray[np.uint8]) -> OrderScores: ...
+    def read(self, pictures: Pixels) -> OrderScores: ...
     @overload
     def read(self, pictures: ArrayLike) -> OrderScores | list[OrderScores]: ...
     def read(self, pictures: ArrayLike) -> OrderScores | list[OrderScores]:
@@ -91,7 +90,7 @@ class NetworkPrior(Prior):
         scores = self._weights.for_pictures(batch.shape[1:]).scores(batch)
         return scores[0] if single else scores
 
-    def predict(self, pictures: ArrayLike) -> NDArray[np.int64]:
+    def predict(self, pictures: ArrayLike) -> Numbers:
         """The model's own order, as the paper compares it; unlike one of `OrderScores`, it may be wrong by itself.
 
         Plain ``bc`` and ``tcn-paper`` take the likeliest action of each step, so the same one may come twice. All
@@ -117,7 +116,7 @@ class NetworkPrior(Prior):
             InputError: a problem has no pictures, pictures of another shape, or actions that the network does not know.
         """
         groups: dict[TrainedNetwork, list[int]] = {}
-        pictures: list[NDArray[np.uint8]] = []
+        pictures: list[Pixels] = []
         for k, problem in enumerate(problems):
             if problem.observation is None:
                 raise InputError(

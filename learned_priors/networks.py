@@ -9,13 +9,13 @@ from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from learned_priors.encoders import PictureShape, build_encoder
 from learned_priors.heads import GlimpseHead, StoppingNetwork, TemporalDecoder, log_length_of_stops
 from learned_priors.sinkhorn import TOLERANCE, log_sinkhorn, scaled_sinkhorn
 from neurosym.errors import CheckpointError
+from neurosym.support.arrays import Array, Pixels
 
 Head = Literal["dense", "tcn", "glimpses"]
 Decoding = Literal["sinkhorn", "rows"]
@@ -137,7 +137,7 @@ class OrderNetwork(nn.Module):
         """uint8 (B, V, H, W, 3) -> what `forward` takes; done once for pictures that are seen many times."""
         return self.encoder.prepare(pictures)
 
-    def chunks(self, pictures: NDArray[np.uint8]) -> Iterator[Tensor]:
+    def chunks(self, pictures: Pixels) -> Iterator[Tensor]:
         """Any number of pictures as `prepare` takes them, a chunk at a time, on this network's device."""
         device = next(self.parameters()).device
         for start in range(0, len(pictures), CHUNK):
@@ -177,7 +177,7 @@ class OrderNetwork(nn.Module):
             return log_length_of_stops(exact.order, exact.stop)
         return None if exact.length is None else torch.log_softmax(exact.length, dim=-1)
 
-    def tables(self, logits: Logits) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
+    def tables(self, logits: Logits) -> tuple[Array, Array | None]:
         """`log_prob` and `log_length` as arrays."""
         length = self.log_length(logits)
         return self.log_prob(logits).cpu().numpy(), None if length is None else length.cpu().numpy()

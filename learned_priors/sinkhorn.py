@@ -13,10 +13,9 @@ import math
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
-Array = NDArray[np.float64]
+from neurosym.support.arrays import Array, Numbers
 
 #: Sums of rows and columns may be off by this much: far below what changes an order, and reached within some tens
 #: of iterations on trained logits.
@@ -146,7 +145,7 @@ def scaled_sinkhorn(
 
 def _alternated(
     x: Array, mass: Array, rows: Array, columns: Array, tolerance: float | None, iterations: int
-) -> NDArray[np.int64]:
+) -> Numbers:
     """Fill in the potentials after at most so many iterations; returns which matrices miss the tolerance then."""
     within = -1.0 if tolerance is None else tolerance  # nothing is
     table = np.exp(x)

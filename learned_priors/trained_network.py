@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
 from learned_priors.metrics import decoded
 from learned_priors.networks import Logits, OrderNetwork
 from neurosym.errors import InputError
 from neurosym.planning.order_scores import OrderScores
+from neurosym.support.arrays import Numbers, Pixels
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +32,7 @@ class TrainedNetwork:
         """One integer an action; empty where each is its own."""
         return tuple(self.header.get("classes", ()))
 
-    def checked(self, pictures: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    def checked(self, pictures: Pixels) -> Pixels:
         """The pictures of one piece of work, if they are such as the network was trained on."""
         expected = self.network.config.picture_shape
         if pictures.shape != expected or pictures.dtype != np.uint8:
@@ -42,7 +42,7 @@ class TrainedNetwork:
             )
         return pictures
 
-    def scores(self, batch: NDArray[np.uint8]) -> list[OrderScores]:
+    def scores(self, batch: Pixels) -> list[OrderScores]:
         """Order scores from pictures (M, V, H, W, 3); columns named as in the training."""
         actions = tuple(self.header["actions"])
         scores: list[OrderScores] = []
@@ -52,7 +52,7 @@ class TrainedNetwork:
             scores += [OrderScores(table, actions, length, self.classes) for table, length in zip(tables, by_table)]
         return scores
 
-    def orders(self, batch: NDArray[np.uint8], *, assigned: bool, sum_classes: bool) -> NDArray[np.int64]:
+    def orders(self, batch: Pixels, *, assigned: bool, sum_classes: bool) -> Numbers:
         """The network's own orders: int64 (M, T), -1 after the last step.
 
         Args:
@@ -70,7 +70,7 @@ class TrainedNetwork:
                 orders.append(_likeliest_by_step(logits))
         return np.concatenate(orders)
 
-    def _logits(self, batch: NDArray[np.uint8]) -> Iterator[Logits]:
+    def _logits(self, batch: Pixels) -> Iterator[Logits]:
         """The network's answers, chunk by chunk."""
         if len(batch):
             self.checked(batch[0])
@@ -80,7 +80,7 @@ class TrainedNetwork:
             yield logits
 
 
-def _likeliest_by_step(logits: Logits) -> NDArray[np.int64]:
+def _likeliest_by_step(logits: Logits) -> Numbers:
     """Each step by itself: int64 (B, T), -1 from the first step on whose likeliest choice is to stop."""
     steps, actions = logits.order.shape[1:]
     if logits.length is not None:
@@ -90,5 +90,5 @@ def _likeliest_by_step(logits: Logits) -> NDArray[np.int64]:
         stop = [] if logits.stop is None else [logits.stop[..., None]]
         choice = torch.cat([logits.order, *stop], dim=-1).argmax(dim=-1)
         ended = (choice == actions).cumsum(dim=-1) > 0
-    order: NDArray[np.int64] = choice.masked_fill(ended, -1).cpu().numpy()
+    order: Numbers = choice.masked_fill(ended, -1).cpu().numpy()
     return order

@@ -10,15 +10,15 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from neurosym.experiments.order_accuracy import classes_at, classes_of, seen_in
 from neurosym.language.demonstrations import Demonstrations
 from neurosym.language.search_problem import Rejection, SearchProblem
+from neurosym.support.arrays import Array
 
 #: As `compare_orders` gives them: metric -> float64 (M,), a value a test picture.
-Figures = dict[str, NDArray[np.float64]]
+Figures = dict[str, Array]
 
 #: Questions to the oracle after which the search for the best fixed order stops with the best it has.
 MAX_ATTEMPTS = 2_000_000

@@ -8,17 +8,16 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from neurosym.errors import InputError
 from neurosym.language.demonstrations import Demonstrations
-
-Ints = NDArray[np.int64]
+from neurosym.support.arrays import Array, Numbers, Truths
 
 
 def compare_orders(
     predicted: ArrayLike, truth: Demonstrations, classes: Sequence[int]
-) -> dict[str, NDArray[np.float64]]:
+) -> dict[str, Array]:
     """How well orders agree with demonstrated ones, where interchangeable actions count as one.
 
     Args:
@@ -43,7 +42,7 @@ def compare_orders(
     }
 
 
-def classes_at(orders: Ints, classes: Sequence[int]) -> Ints:
+def classes_at(orders: Numbers, classes: Sequence[int]) -> Numbers:
     """int64 (M, T): the class of the action at each step; -1 where there is none."""
     # Index -1, no action, takes the last entry.
     return np.asarray(np.append(np.asarray(classes, dtype=np.int64), -1)[orders])
@@ -54,13 +53,13 @@ def classes_of(given: Demonstrations) -> tuple[int, ...]:
     return tuple(int(c) for c in np.unique(given.classes or range(len(given.actions)), return_inverse=True)[1])
 
 
-def seen_in(train: Demonstrations, test: Demonstrations) -> NDArray[np.bool_]:
+def seen_in(train: Demonstrations, test: Demonstrations) -> Truths:
     """bool (M,): which test sequences, of classes, are among those of the training."""
     known = {row.tobytes() for row in classes_at(train.sequences, classes_of(train))}
     return np.array([row.tobytes() in known for row in classes_at(test.sequences, classes_of(test))])
 
 
-def averages(figures: Mapping[str, NDArray[np.float64]], seen: NDArray[np.bool_]) -> dict[str, float]:
+def averages(figures: Mapping[str, Array], seen: Truths) -> dict[str, float]:
     """Means over all pictures, and of `whole_sequence` and `per_step` over those seen in training and not, apart.
 
     Args:
@@ -91,9 +90,9 @@ class Counts:
 
     labels: tuple[str, ...]
     members: tuple[int, ...]
-    confusion: Ints
-    right: Ints
-    repeats: Ints
+    confusion: Numbers
+    right: Numbers
+    repeats: Numbers
 
     @classmethod
     def of(cls, predicted: ArrayLike, truth: Demonstrations) -> Counts:
@@ -131,7 +130,7 @@ class Counts:
         return cls(tuple(given["labels"]), tuple(given["members"]), *arrays)
 
 
-def _checked(predicted: ArrayLike, truth: Demonstrations) -> Ints:
+def _checked(predicted: ArrayLike, truth: Demonstrations) -> Numbers:
     order = np.asarray(predicted, dtype=np.int64)
     if order.shape != truth.sequences.shape:
         raise InputError(f"Expected predicted orders of shape {truth.sequences.shape}; got {order.shape}.")

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from neurosym.errors import DemonstrationError
+from neurosym.support.arrays import Numbers, Pixels
 from neurosym.support.files import replacing
 
 SCHEMA = 1
@@ -35,11 +36,11 @@ class Demonstrations:
             leaves the whole problem as it was. Empty: each is its own.
     """
 
-    pictures: NDArray[np.uint8]
-    sequences: NDArray[np.int64]
+    pictures: Pixels
+    sequences: Numbers
     actions: tuple[str, ...]
     marginals: NDArray[np.float32] | None = None
-    groups: NDArray[np.int64] | None = None
+    groups: Numbers | None = None
     domain: str = ""
     classes: tuple[int, ...] = ()
 
@@ -72,9 +73,9 @@ class Demonstrations:
         return len(self.pictures)
 
     @property
-    def lengths(self) -> NDArray[np.int64]:
+    def lengths(self) -> Numbers:
         """int64 (M,): how many steps each order has."""
-        lengths: NDArray[np.int64] = (self.sequences >= 0).sum(axis=1)
+        lengths: Numbers = (self.sequences >= 0).sum(axis=1)
         return lengths
 
     def subset(self, index: ArrayLike) -> Demonstrations:
@@ -139,7 +140,7 @@ class Demonstrations:
         )
 
 
-def _checked_sequences(given: ArrayLike, m: int, actions: tuple[str, ...]) -> NDArray[np.int64]:
+def _checked_sequences(given: ArrayLike, m: int, actions: tuple[str, ...]) -> Numbers:
     sequences = np.asarray(given)
     n = len(actions)
     if sequences.ndim != 2 or len(sequences) != m or not np.issubdtype(sequences.dtype, np.integer):

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from neurosym.language.demonstrations import Demonstrations
+from neurosym.language.domain import Domain
+from neurosym.language.problem import Problem
 from neurosym.language.semantics import Semantics
+from neurosym.support.arrays import Pixels
 from neurosym.support.progress import Progress as Progress
-
-if TYPE_CHECKING:
-    from neurosym.language.demonstrations import Demonstrations
-    from neurosym.language.domain import Domain
-    from neurosym.language.problem import Problem
 
 
 class ProblemFamily(Semantics, ABC):
@@ -47,7 +45,7 @@ class ProblemFamily(Semantics, ABC):
 
     def pictures(
         self, problem: Problem, *, style: str = "clean", rng: np.random.Generator | None = None
-    ) -> NDArray[np.uint8]:
+    ) -> Pixels:
         """Pictures of the finished work, uint8 (V, H, W, 3)."""
         raise NotImplementedError(f"the domain {self.name!r} has no pictures")
 
@@ -66,7 +64,7 @@ class ProblemFamily(Semantics, ABC):
 
     def take_pictures(
         self, problems: Sequence[Problem], *, style: str, workers: int = 1, progress: Progress | None = None
-    ) -> NDArray[np.uint8] | None:
+    ) -> Pixels | None:
         """Pictures of many problems of one style, uint8 (M, V, H, W, 3): those that each would take by itself.
 
         None, the default, leaves it to the problems.

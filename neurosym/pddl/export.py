@@ -12,16 +12,13 @@ import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from neurosym.errors import InputError, UnknownNameError
+from neurosym.language.problem import Problem
 from neurosym.language.terms import Type
 from neurosym.pddl.names import Names
 from neurosym.pddl.strips import Fact, Mark, Strips, strips
 from neurosym.support.files import write_text
-
-if TYPE_CHECKING:
-    from neurosym.language.problem import Problem
 
 #: Time for what has to be searched: the falls under gravity, or the states of a domain without formulas (seconds).
 SECONDS = 60.0

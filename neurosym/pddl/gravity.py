@@ -9,17 +9,14 @@ from __future__ import annotations
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
+from neurosym.geometry.assembly import Assembly
+from neurosym.geometry.stability.falls import Fall
 from neurosym.language.formulas import Formula, Stands
+from neurosym.language.problem import Problem
 from neurosym.language.terms import Fluent, Literal
 from neurosym.pddl.facts import Fact, Mark, Operator
 from neurosym.pddl.instances import Instance, least
-
-if TYPE_CHECKING:
-    from neurosym.geometry.assembly import Assembly
-    from neurosym.geometry.stability.falls import Fall
-    from neurosym.language.problem import Problem
 
 #: Of one way to do an action: into so many operators its disjunctions are multiplied out, at the most. What is left
 #: over gets helper operators instead, which change nothing but a mark.

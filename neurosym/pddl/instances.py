@@ -9,15 +9,13 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 from neurosym.language.formulas import AnyOf, Formula
+from neurosym.language.problem import Problem
 from neurosym.language.terms import Atom, Derived, Literal
 from neurosym.pddl.facts import Fact, Mark
 from neurosym.pddl.table import ways_from_table
-
-if TYPE_CHECKING:
-    from neurosym.language.problem import Problem
 
 T = TypeVar("T")
 

@@ -8,9 +8,9 @@ falls that removals can meet (`pddl_gravity`).
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 from neurosym.errors import InputError
+from neurosym.language.problem import Problem
 from neurosym.language.terms import Derived, Literal
 from neurosym.pddl.facts import Fact as Fact
 from neurosym.pddl.facts import Mark as Mark
@@ -18,9 +18,6 @@ from neurosym.pddl.facts import Operator as Operator
 from neurosym.pddl.facts import Strips as Strips
 from neurosym.pddl.gravity import standing_asked, weighed
 from neurosym.pddl.instances import Instance, formulas_of, ground_instances, with_formulas, with_table
-
-if TYPE_CHECKING:
-    from neurosym.language.problem import Problem
 
 
 def strips(problem: Problem, *, seconds: float | None = None, refuted: Sequence[Sequence[str]] = ()) -> Strips:

@@ -5,17 +5,14 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from neurosym.errors import InputError
+from neurosym.language.problem import Problem
 from neurosym.language.search_problem import Rejection
 from neurosym.language.terms import Atom, Derived, Literal
-
-if TYPE_CHECKING:
-    from neurosym.language.problem import Problem
+from neurosym.support.arrays import Truths
 
 #: More states than this are not written down.
 MAX_STATES = 20_000
@@ -90,7 +87,7 @@ def ways_from_table(problem: Problem, seconds: float | None = None) -> Table:
     return Table(ways, len(states))
 
 
-def _cover(good: NDArray[np.bool_], bad: NDArray[np.bool_]) -> list[list[tuple[int, bool]]]:
+def _cover(good: Truths, bad: Truths) -> list[list[tuple[int, bool]]]:
     """Conjunctions of (column, value) that hold in each row of `good`, (n, c), one of them at least; none in `bad`."""
     left, found = good, []
     while len(left):

@@ -6,18 +6,16 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from neurosym.errors import InputError
 from neurosym.geometry.readers.references import referenced
 from neurosym.geometry.step_motion import StepMotion
+from neurosym.language.problem import Problem
 from neurosym.language.search_problem import Rejection
 from neurosym.plan_files.writing import SCHEMA
 from neurosym.planning.result import Status
 from neurosym.registry import load_domain
-
-if TYPE_CHECKING:
-    from neurosym.language.problem import Problem
 
 #: Figures of a search.
 COUNTS = ("iterations", "attempts", "expansions", "seconds")

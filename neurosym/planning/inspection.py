@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from neurosym.errors import InputError
 from neurosym.geometry.contact.contacts import TABLE, areas_between
 from neurosym.geometry.queries import AssemblyGeometry
 from neurosym.geometry.step_motion import GROUND
 from neurosym.language.explanation import WhyNot
-
-if TYPE_CHECKING:
-    from neurosym.language.problem import Problem
+from neurosym.language.problem import Problem
 
 
 @dataclass(frozen=True)

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from neurosym.errors import InputError
+from neurosym.support.arrays import Array
 
 #: Least log-probability a score may have (nats). A prior that is sure still leaves every order a finite cost.
 LOG_FLOOR = -30.0
@@ -35,9 +35,9 @@ class OrderScores:
             share their probability). Default: each action is its own class.
     """
 
-    log_prob: NDArray[np.float64]
+    log_prob: Array
     actions: tuple[str, ...] = ()
-    log_length: NDArray[np.float64] | None = None
+    log_length: Array | None = None
     classes: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
@@ -85,7 +85,7 @@ class OrderScores:
         return int(self.log_prob.shape[1])
 
     @cached_property
-    def costs(self) -> NDArray[np.float64]:
+    def costs(self) -> Array:
         """float64 (n_steps, n_actions): -log of the summed probability of each action's class (nats, >= 0)."""
         ids, column = np.unique(np.asarray(self.classes), return_inverse=True)
         if len(ids) == self.n_actions:
@@ -93,7 +93,7 @@ class OrderScores:
         member = np.zeros((self.n_actions, len(ids)))
         member[np.arange(self.n_actions), column] = 1.0
         summed = np.log(np.exp(self.log_prob) @ member)
-        costs: NDArray[np.float64] = np.maximum(-summed, 0.0)[:, column]
+        costs: Array = np.maximum(-summed, 0.0)[:, column]
         return costs
 
     def cost(self, step: int, action: int) -> float:
@@ -161,7 +161,7 @@ class OrderScores:
         return OrderScores(rows[:, columns], tuple(actions), length, classes)
 
 
-def _normalised(table: NDArray[np.float64]) -> NDArray[np.float64]:
+def _normalised(table: Array) -> Array:
     """Rows that sum to one in exp(), none below the floor (rows of nothing but -inf become uniform)."""
     if table.size == 0:
         return table
@@ -169,5 +169,5 @@ def _normalised(table: NDArray[np.float64]) -> NDArray[np.float64]:
     shifted = np.where(np.isfinite(top), table - np.where(np.isfinite(top), top, 0.0), 0.0)
     shifted = shifted - np.log(np.exp(shifted).sum(axis=1, keepdims=True))
     floored = np.maximum(shifted, LOG_FLOOR)
-    result: NDArray[np.float64] = floored - np.log(np.exp(floored).sum(axis=1, keepdims=True))
+    result: Array = floored - np.log(np.exp(floored).sum(axis=1, keepdims=True))
     return result

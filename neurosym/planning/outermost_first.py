@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,12 +10,10 @@ from neurosym.errors import InputError
 from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.blocking.directions import Directions
 from neurosym.geometry.queries import AssemblyGeometry
+from neurosym.language.problem import Problem
 from neurosym.planning.order_scores import OrderScores
 from neurosym.planning.prior import Prior
 from neurosym.support.bitsets import bits
-
-if TYPE_CHECKING:
-    from neurosym.language.problem import Problem
 
 
 class OutermostFirst(Prior):

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from neurosym.language.search_problem import SearchProblem
 from neurosym.planning.budget import Budget
 from neurosym.planning.order_scores import OrderScores
 from neurosym.planning.result import OrderCount, PlanResult
+from neurosym.support.arrays import Array
 
 
 @dataclass(frozen=True)
@@ -105,4 +105,4 @@ class OrderCounter(Protocol):
 
     def count_orders(self, problem: SearchProblem[Any], *, budget: Budget | None = None) -> OrderCount: ...
 
-    def order_marginals(self, problem: SearchProblem[Any]) -> NDArray[np.float64]: ...
+    def order_marginals(self, problem: SearchProblem[Any]) -> Array: ...

@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from enum import Enum
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from neurosym.errors import ContractError, InputError
+from neurosym.geometry.step_motion import StepMotion
+from neurosym.language.explanation import WhyNot
 from neurosym.language.search_problem import Rejection
-
-if TYPE_CHECKING:
-    from neurosym.geometry.step_motion import StepMotion
-    from neurosym.language.explanation import WhyNot
 
 
 class Status(Enum):

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from neurosym.errors import InputError, UnknownNameError
 from neurosym.geometry.staging import Staging, staged
 from neurosym.geometry.step_motion import StepMotion, check_motions
 from neurosym.language.actions import moved_parts
-
-if TYPE_CHECKING:
-    from neurosym.language.problem import Problem
+from neurosym.language.problem import Problem
 
 
 def stage(problem: Problem, plan: Sequence[str], motions: Sequence[StepMotion | None] = ()) -> Staging:

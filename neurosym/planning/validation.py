@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from neurosym.errors import ContractError, InputError, UnknownNameError
 from neurosym.geometry.step_motion import StepMotion, check_motions
+from neurosym.language.problem import Problem
 from neurosym.language.search_problem import Rejection, SearchProblem
 from neurosym.language.semantics import Validation as Validation
 from neurosym.language.state import AtomSet
 from neurosym.language.terms import Derived, Literal
-
-if TYPE_CHECKING:
-    from neurosym.language.problem import Problem
 
 
 def validate(problem: Problem, order: Sequence[str], motions: Sequence[StepMotion | None] = ()) -> Validation:

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from neurosym.plotting.style import COLUMN, SMALL, TITLE, add_legend, look_of, tidy
+from neurosym.support.arrays import Numbers
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -42,7 +42,7 @@ class Spread:
     """
 
     method: str
-    right: Mapping[int, NDArray[np.int64]]
+    right: Mapping[int, Numbers]
 
 
 def curves_figure(

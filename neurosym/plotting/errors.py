@@ -6,15 +6,15 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from neurosym.plotting.style import COLUMN, SMALL, TITLE, add_legend, look_of, tidy
+from neurosym.support.arrays import Array, Numbers
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Counts = Mapping[str, NDArray[np.int64]]
+Counts = Mapping[str, Numbers]
 
 #: How a step that is not there is called.
 NONE = "none"
@@ -114,7 +114,7 @@ def repeats_figure(title: str, repeats: Counts) -> Figure:
     return figure
 
 
-def write_shares(axis: Axes, shares: NDArray[np.float64], size: float = 6) -> None:
+def write_shares(axis: Axes, shares: Array, size: float = 6) -> None:
     """Each share of a matrix into its cell, in per cent; what rounds to 0% is left out."""
     for i, row in enumerate(shares):
         for j, share in enumerate(row):
@@ -123,7 +123,7 @@ def write_shares(axis: Axes, shares: NDArray[np.float64], size: float = 6) -> No
                 axis.text(j, i, f"{100 * share:.0f}", ha="center", va="center", fontsize=size, color=colour)
 
 
-def _by_row(counts: NDArray[np.int64]) -> NDArray[np.float64]:
+def _by_row(counts: Numbers) -> Array:
     """Shares; a row without counts is NaN, and stays white."""
     totals = counts.sum(axis=1, keepdims=True).astype(float)
     totals[totals == 0] = np.nan

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 import networkx as nx
 import numpy as np
-from numpy.typing import NDArray
 
 from neurosym.geometry.step_motion import GROUND
 from neurosym.plotting.labels import shortened
 from neurosym.plotting.style import COLUMN, SMALL, TITLE, tidy
+from neurosym.support.arrays import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -63,7 +63,7 @@ def contact_matrix(title: str, assembly: Assembly, areas: Mapping[tuple[str, str
 
     names = [*assembly.names, *([GROUND] if assembly.has_table else [])]
     index = {name: i for i, name in enumerate(names)}
-    table: NDArray[np.float64] = np.full((len(names), len(names)), np.nan)
+    table: Array = np.full((len(names), len(names)), np.nan)
     for (a, b), area in areas.items():
         table[index[a], index[b]] = table[index[b], index[a]] = area
     figure = Figure(figsize=(COLUMN, COLUMN + 0.75), layout="constrained")

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from neurosym.plotting.layers import BOX, box_width
+from neurosym.support.arrays import Array
 
-Array = NDArray[np.float64]
 Point = tuple[float, float]
 
 #: Bends that are tried, as shares of a line's length (the ``rad`` of matplotlib's ``arc3``), the straight line first.

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from neurosym.geometry.staging import Staging
 from neurosym.simulation.captions import captioned
@@ -14,8 +13,8 @@ from neurosym.simulation.filming import FilmSet
 from neurosym.simulation.looks import Camera
 from neurosym.simulation.scene import part_colours
 from neurosym.simulation.storyboard import best_camera, company, describe, first_part, room_for
+from neurosym.support.arrays import Pixels
 
-Picture = NDArray[np.uint8]
 #: Called with (done, total) pictures.
 Progress = Callable[[int, int], None]
 
@@ -36,7 +35,7 @@ def frames(
     size: tuple[int, int] = (640, 480),
     camera: Camera | None = None,
     progress: Progress | None = None,
-) -> Iterator[Picture]:
+) -> Iterator[Pixels]:
     """Pictures of a plan, one after another, `RATE` a second.
 
     What leaves moves along its path and then is gone; what arrives comes in along it. What made way goes back. Parts
@@ -104,7 +103,7 @@ def pace(count: int) -> tuple[int, int, int]:
     return moving, max(1, held), ends
 
 
-def _whole(film: FilmSet, staging: Staging, step: int) -> Picture:
+def _whole(film: FilmSet, staging: Staging, step: int) -> Pixels:
     """What is there before a step; where nothing is, all that ever is, pale."""
     there = staging.there(step)
     if there:

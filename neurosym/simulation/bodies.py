@@ -8,15 +8,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from neurosym.errors import UnknownNameError
 from neurosym.simulation.client import Client
 from neurosym.simulation.collision_shapes import collision_shape
 from neurosym.simulation.physics import BodyKey, Frame, Physics, Snapshot
 from neurosym.simulation.solids import RigidBody, quaternion
-
-Array = NDArray[np.float64]
+from neurosym.support.arrays import Array
 
 
 class Bodies:

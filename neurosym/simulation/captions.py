@@ -6,18 +6,16 @@ from collections.abc import Mapping
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from neurosym.simulation.scene import RGB
-
-Picture = NDArray[np.uint8]
+from neurosym.support.arrays import Pixels
 
 _PAPER, _TEXT, _FAINT = (255, 255, 255), (38, 38, 46), (214, 214, 220)
 
 
 def captioned(
-    picture: Picture, text: str, *, note: str = "", colour: RGB | None = None, progress: float | None = None
-) -> Picture:
+    picture: Pixels, text: str, *, note: str = "", colour: RGB | None = None, progress: float | None = None
+) -> Pixels:
     """The picture with a line of words below it.
 
     Args:
@@ -61,7 +59,7 @@ def captioned(
     return np.asarray(canvas)
 
 
-def label(picture: Picture, seen: Mapping[str, tuple[float, float, float]]) -> Picture:
+def label(picture: Pixels, seen: Mapping[str, tuple[float, float, float]]) -> Pixels:
     """The picture with names written on circles (x, y, radius), in pixels.
 
     A name too long for its circle stands beside it, away from the middle of all, at the end of a thin line; where it

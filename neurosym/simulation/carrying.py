@@ -6,14 +6,12 @@ from collections.abc import Callable, Mapping, Sequence
 from math import ceil
 
 import numpy as np
-from numpy.typing import NDArray
 
 from neurosym.geometry.step_motion import StepMotion
 from neurosym.simulation.physics import BodyKey
 from neurosym.simulation.solids import matrix, quaternion
 from neurosym.simulation.world import World
 
-Array = NDArray[np.float64]
 #: Position and quaternion (x, y, z, w) of a body's centre-of-mass frame, in the scene's scale.
 Frame = tuple[list[float], list[float]]
 

@@ -7,12 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from neurosym.simulation.client import Client
 from neurosym.simulation.solids import RigidBody, quaternion
-
-Array = NDArray[np.float64]
+from neurosym.support.arrays import Array
 
 #: PyBullet joins so many shapes to a compound, and drops all further ones without a word.
 MOST_JOINED = 16

@@ -8,9 +8,8 @@ stays whole and a joint or a frame falls into few pieces. A bowl has hundreds of
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from neurosym.support.arrays import Array, Numbers
 
 #: Meshes of more faces than this, or that fall into more pieces, are not worth cutting.
 MOST_FACES, MOST_PIECES = 600, 60
@@ -18,7 +17,7 @@ MOST_FACES, MOST_PIECES = 600, 60
 ON_PLANE = 1e-6
 
 
-def cut_into_convex(vertices: Array, faces: NDArray[np.int64]) -> list[Array] | None:
+def cut_into_convex(vertices: Array, faces: Numbers) -> list[Array] | None:
     """Corners of the convex pieces of a closed mesh, each float64 (n, 3); None when they would be too many.
 
     Args:

@@ -13,13 +13,11 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from neurosym.errors import AssemblyError
 from neurosym.simulation.client import pybullet, without_output
 from neurosym.simulation.cutting import cut_into_convex
-
-Array = NDArray[np.float64]
+from neurosym.support.arrays import Array, Numbers
 
 #: V-HACD's voxels in a part's bounding box: at 100,000 a cubic part has some 46 along an edge.
 VOXELS = 100_000
@@ -27,7 +25,7 @@ VOXELS = 100_000
 CONCAVITY = 0.001
 
 
-def convex_pieces(name: str, vertices: Array, faces: NDArray[np.int64]) -> list[Array]:
+def convex_pieces(name: str, vertices: Array, faces: Numbers) -> list[Array]:
     """Corners of convex pieces that together make up a closed mesh, each float64 (n, 3), in the mesh's frame.
 
     Args:
@@ -41,7 +39,7 @@ def convex_pieces(name: str, vertices: Array, faces: NDArray[np.int64]) -> list[
     return cut_into_convex(vertices, faces) or _by_vhacd(name, vertices, faces)
 
 
-def _by_vhacd(name: str, vertices: Array, faces: NDArray[np.int64]) -> list[Array]:
+def _by_vhacd(name: str, vertices: Array, faces: Numbers) -> list[Array]:
     # It works in single precision and expects lengths of about one.
     low, span = vertices.min(axis=0), float(np.ptp(vertices, axis=0).max())
     scaled = (vertices - low) / span

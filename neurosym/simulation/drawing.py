@@ -6,15 +6,15 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from neurosym.simulation.client import Client
+from neurosym.support.arrays import Array, Pixels
 
 #: The colour of light, and how much of it shines everywhere, on what faces it, and back from what is polished.
 WHITE = (1, 1, 1)
 
 
-def flat_shaded(triangles: NDArray[np.float64]) -> dict[str, Any]:
+def flat_shaded(triangles: Array) -> dict[str, Any]:
     """The surface of triangles (n, 3, 3) as `createVisualShape` takes it.
 
     Corners are not shared between triangles: each face keeps its own normal, and edges stay sharp.
@@ -38,7 +38,7 @@ def drawn(
     distance: float,
     shades: tuple[float, float, float],
     **options: Any,
-) -> tuple[NDArray[np.uint8], Any, Any]:
+) -> tuple[Pixels, Any, Any]:
     """One picture: colours, uint8 (height, width, 3), and PyBullet's depths and numbers of bodies.
 
     Args:

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from neurosym.errors import InputError
 from neurosym.geometry.staging import Staging
@@ -15,12 +13,7 @@ from neurosym.simulation.filming import FilmSet
 from neurosym.simulation.looks import Camera
 from neurosym.simulation.scene import part_colours
 from neurosym.simulation.storyboard import best_camera
-
-if TYPE_CHECKING:
-    pass
-
-Array = NDArray[np.float64]
-Picture = NDArray[np.uint8]
+from neurosym.support.arrays import Array, Pixels
 
 #: Gap between the bounds of exploded parts, as a share of the median part's extent.
 GAP = 0.35
@@ -82,7 +75,7 @@ def exploded_view(
     camera: Camera | None = None,
     title: str = "",
     names: bool = True,
-) -> Picture:
+) -> Pixels:
     """A picture of the parts pulled apart: see `explode`.
 
     Args:

@@ -11,12 +11,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from neurosym.errors import InputError, MissingDependencyError
+from neurosym.support.arrays import Pixels
 from neurosym.support.files import replacing
-
-Picture = NDArray[np.uint8]
 
 #: Pictures a second, in every kind of film.
 RATE = 15
@@ -24,7 +22,7 @@ RATE = 15
 ENDINGS = (".gif", ".mp4")
 
 
-def write_film(pictures: Iterator[Picture], out: str | Path) -> Path:
+def write_film(pictures: Iterator[Pixels], out: str | Path) -> Path:
     """Write pictures as a film, whole or not at all.
 
     Args:
@@ -56,12 +54,12 @@ def check_film(out: str | Path) -> None:
         raise InputError(f"Expected a file to write; {path} is a folder.")
 
 
-def _write_gif(pictures: Iterator[Picture], path: Path) -> Path:
+def _write_gif(pictures: Iterator[Pixels], path: Path) -> Path:
     from PIL import Image
 
     runs: list[Any] = []
     times: list[int] = []
-    last: Picture | None = None
+    last: Pixels | None = None
     for picture in pictures:
         if last is not None and np.array_equal(picture, last):
             times[-1] += 1
@@ -79,7 +77,7 @@ def _write_gif(pictures: Iterator[Picture], path: Path) -> Path:
     return path
 
 
-def _write_mp4(pictures: Iterator[Picture], path: Path) -> Path:
+def _write_mp4(pictures: Iterator[Pixels], path: Path) -> Path:
     ffmpeg = _ffmpeg()
     writer: Any = None
     with replacing(path) as temporary:
@@ -128,7 +126,7 @@ def _is_frame(name: str) -> bool:
     return name.startswith("frame-") and name.endswith(".png")
 
 
-def _write_folder(pictures: Iterator[Picture], path: Path) -> Path:
+def _write_folder(pictures: Iterator[Pixels], path: Path) -> Path:
     from PIL import Image
 
     _check_folder(path)
@@ -146,7 +144,7 @@ def _write_folder(pictures: Iterator[Picture], path: Path) -> Path:
     return path
 
 
-def still(picture: Picture, out: str | Path) -> Path:
+def still(picture: Pixels, out: str | Path) -> Path:
     """Write one picture as PNG, whole or not at all.
 
     Raises:

@@ -10,24 +10,20 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Collection, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from neurosym.errors import InputError
+from neurosym.geometry.assembly import Assembly
 from neurosym.simulation.client import Client, Closeable
 from neurosym.simulation.drawing import drawn, flat_shaded
 from neurosym.simulation.looks import Camera, aimed
 from neurosym.simulation.scene import RGB
 from neurosym.simulation.shading import LIGHT, Single, cast, ink, set_off
 from neurosym.simulation.solids import quaternion
-
-if TYPE_CHECKING:
-    from neurosym.geometry.assembly import Assembly
-
-Array = NDArray[np.float64]
-Picture = NDArray[np.uint8]
+from neurosym.support.arrays import Array, Pixels
 
 #: Drawn so many times larger, along each axis, than it is handed out.
 OVERSAMPLING = 2
@@ -66,7 +62,7 @@ class FilmSet(Closeable):
         size: tuple[int, int] = (640, 480),
         camera: Camera = DEFAULT_CAMERA,
         ground: bool = True,
-        tops: Mapping[str, Picture] | None = None,
+        tops: Mapping[str, Pixels] | None = None,
     ) -> None:
         if min(size) < 16:
             raise InputError(f"Expected pictures of at least 16 x 16 pixels; got {size[0]} x {size[1]}.")
@@ -92,7 +88,7 @@ class FilmSet(Closeable):
 
     def picture(
         self, shown: Collection[str], where: Mapping[str, Array] | None = None, *, marked: Collection[str] = ()
-    ) -> Picture:
+    ) -> Pixels:
         """One picture.
 
         Args:
@@ -142,7 +138,7 @@ class FilmSet(Closeable):
                 found[name] = (float(x / OVERSAMPLING), float(y / OVERSAMPLING), radius)
         return found
 
-    def _shoot(self, shown: Collection[str], moved: Mapping[str, Array], marked: Collection[str]) -> Picture:
+    def _shoot(self, shown: Collection[str], moved: Mapping[str, Array], marked: Collection[str]) -> Pixels:
         from PIL import Image
 
         colour, distance, owner = self._drawn()
@@ -167,7 +163,7 @@ class FilmSet(Closeable):
         shift = (X[:3, :3] @ self._middle + X[:3, 3] - self._middle) * self._scale
         return np.asarray(self._triangles[name] @ X[:3, :3].T + shift)
 
-    def _drawn(self) -> tuple[Picture, Single, NDArray[np.int32]]:
+    def _drawn(self) -> tuple[Pixels, Single, NDArray[np.int32]]:
         """The large picture: colours (height, width, 3), distances and numbers of parts, -1: none, (height, width)."""
         width, height = (n * OVERSAMPLING for n in self.size)
         colour, depth, parts = drawn(
@@ -199,7 +195,7 @@ class FilmSet(Closeable):
         visual = self._visual(self._triangles[name], [*colours[name], 1.0])
         return int(p.createMultiBody(0, -1, visual, physicsClientId=c))
 
-    def _top(self, name: str, picture: Picture) -> int:
+    def _top(self, name: str, picture: Pixels) -> int:
         """A sheet that lies on a part's bounds, with a picture on it."""
         from PIL import Image
 

@@ -7,11 +7,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from neurosym.errors import UnknownNameError
-
-Array = NDArray[np.float64]
+from neurosym.support.arrays import Array
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,21 +9,19 @@ from __future__ import annotations
 from collections import OrderedDict
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal, Protocol
+from typing import Literal, Protocol
 
 import numpy as np
 
 from neurosym.errors import InputError
 from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.step_motion import StepMotion
+from neurosym.language.problem import Problem
 from neurosym.language.search_problem import Rejection, Step
 from neurosym.simulation.client import Closeable
 from neurosym.simulation.physics import MOVED_SHARE, SETTLE_STEPS, Physics, Snapshot
 from neurosym.simulation.world import World
 from neurosym.support.words import joined
-
-if TYPE_CHECKING:
-    from neurosym.language.problem import Problem
 
 #: The state of a problem under physics: the symbols, and the actions done so far, in order.
 PhysicsState = tuple[int, tuple[int, ...]]

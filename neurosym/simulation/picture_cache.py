@@ -11,12 +11,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from neurosym.errors import InputError
 from neurosym.simulation.looks import VIEWS, Camera, Style, style_named
 from neurosym.simulation.render import CHUNK, Job, Progress, render_chunks, scenes_of
 from neurosym.simulation.scene import RGB, Scene
+from neurosym.support.arrays import Pixels
 from neurosym.support.disk_cache import cache_folder, fill
 
 #: Raise it whenever the same request would give other pixels.
@@ -33,7 +33,7 @@ def cached_pictures(
     progress: Progress | None = None,
     folder: str | Path | None = None,
     cameras: Sequence[Camera] = VIEWS,
-) -> NDArray[np.uint8]:
+) -> Pixels:
     """Pictures of many assemblies, as `render_many` makes them, from disk where they were made before.
 
     Put together what is asked for together: a file holds 48 jobs that follow one another (a cube in its 48

@@ -10,7 +10,6 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from neurosym.errors import InputError
 from neurosym.geometry.assembly import Assembly
@@ -18,6 +17,7 @@ from neurosym.simulation.client import Client, Closeable
 from neurosym.simulation.drawing import drawn, flat_shaded
 from neurosym.simulation.looks import VIEWS, Camera, Style, draw_look, style_named
 from neurosym.simulation.scene import RGB, Scene, scene_of
+from neurosym.support.arrays import Array, Pixels
 
 #: Called with (done, total) while many pictures are made.
 Progress = Callable[[int, int], None]
@@ -56,7 +56,7 @@ class PictureStudio(Closeable):
         size: int = 64,
         rng: np.random.Generator | None = None,
         cameras: Sequence[Camera] = VIEWS,
-    ) -> NDArray[np.uint8]:
+    ) -> Pixels:
         """Pictures of an assembly, one a camera.
 
         Args:
@@ -101,7 +101,7 @@ class PictureStudio(Closeable):
             pictures = np.clip(np.rint(pictures + noise), 0, 255).astype(np.uint8)
         return pictures
 
-    def _arrange(self, scene: Scene, colours: NDArray[np.float64]) -> None:
+    def _arrange(self, scene: Scene, colours: Array) -> None:
         """Put bodies where the scene has them. The order in which bodies are made shows in single pixels along edges,
         so bodies are reused only by a scene of the very same shapes."""
         p, c = self._p, self._client.id
@@ -133,7 +133,7 @@ def render_views(
     size: int = 64,
     rng: np.random.Generator | None = None,
     cameras: Sequence[Camera] = VIEWS,
-) -> NDArray[np.uint8]:
+) -> Pixels:
     """Pictures of one assembly, uint8 (4, size, size, 3); see `PictureStudio.views`, faster for many."""
     with PictureStudio() as studio:
         return studio.views(assembly, style=style, colours=colours, size=size, rng=rng, cameras=cameras)
@@ -148,7 +148,7 @@ def render_many(
     workers: int = 1,
     progress: Progress | None = None,
     cameras: Sequence[Camera] = VIEWS,
-) -> NDArray[np.uint8]:
+) -> Pixels:
     """Pictures of many assemblies, in order, the same for any number of workers.
 
     Args:
@@ -208,14 +208,14 @@ def _in_this_process(
 
 def _render_chunk(
     chunk: Sequence[tuple[Scene, int]], style: Style, size: int, cameras: Sequence[Camera]
-) -> NDArray[np.uint8]:
+) -> Pixels:
     with PictureStudio() as studio:
         return _draw(studio, chunk, style, size, cameras)
 
 
 def _draw(
     studio: PictureStudio, chunk: Sequence[tuple[Scene, int]], style: Style, size: int, cameras: Sequence[Camera]
-) -> NDArray[np.uint8]:
+) -> Pixels:
     return np.stack(
         [
             studio.views(scene, style=style, size=size, rng=np.random.default_rng(seed), cameras=cameras)

@@ -17,10 +17,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import ExitStack
-from typing import TYPE_CHECKING
 
+from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.staging import Staging
 from neurosym.geometry.step_motion import StepMotion
+from neurosym.language.problem import Problem
 from neurosym.planning.staging import stage
 from neurosym.simulation.carrying import Carrier, hold
 from neurosym.simulation.oracle import COLLAPSE_CUBES, CUBES_CLEARANCE
@@ -28,10 +29,6 @@ from neurosym.simulation.physics import MOVED_SHARE, SETTLE_STEPS, Physics, Snap
 from neurosym.simulation.replay_report import ReplayReport, StepReplay, in_hand, reason_of
 from neurosym.simulation.world import World
 from neurosym.simulation.world_window import WorldWindow
-
-if TYPE_CHECKING:
-    from neurosym.geometry.assembly import Assembly
-    from neurosym.language.problem import Problem
 
 #: A pulled part that ends farther than this from its path's end, in typical bodies, was jammed.
 JAMMED_SHARE = 0.5

@@ -9,15 +9,14 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from neurosym.errors import InputError, UnknownNameError
 from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.shapes import Shape
 from neurosym.geometry.staging import Staging
+from neurosym.support.arrays import Array, Numbers
 
-Array = NDArray[np.float64]
 RGB = tuple[float, float, float]
 
 #: Colours of parts in their order, RGB in 0..1: Okabe and Ito's, which people with any colour vision tell apart, black
@@ -56,8 +55,8 @@ class Scene:
     position: Array
     turn: Array
     half: Array
-    meshes: Mapping[int, tuple[Array, NDArray[np.int64]]]
-    owner: NDArray[np.int64]
+    meshes: Mapping[int, tuple[Array, Numbers]]
+    owner: Numbers
     colours: Array
 
     @cached_property
@@ -137,8 +136,8 @@ _TURNS = np.array(
 
 
 def _faces(
-    assembly: Assembly, poses: Array, boxes: NDArray[np.int64], scale: float
-) -> tuple[Array, Array, NDArray[np.int64]]:
+    assembly: Assembly, poses: Array, boxes: Numbers, scale: float
+) -> tuple[Array, Array, Numbers]:
     """Frames (n, 4, 4), half edges (n, 3) and owners (n,) of the boxes' faces, without those that cover each other."""
     half = assembly.bodies.box_sizes[boxes] * scale / 2
     R = poses[boxes, :3, :3]

@@ -7,7 +7,8 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from neurosym.support.arrays import Array, Pixels
+
 Single = NDArray[np.float32]
 
 #: Colour of outlines, and how much of it shows (0..1).
@@ -19,7 +20,7 @@ LIGHT = np.array([-0.46, -0.50, 0.734])
 _SHADE, _SOFT = 56.0, 0.008
 
 
-def ink(colour: NDArray[np.uint8], owner: NDArray[np.int32], distance: Single) -> None:
+def ink(colour: Pixels, owner: NDArray[np.int32], distance: Single) -> None:
     """Draw dark lines into a picture: where one part ends and another begins, and where a surface folds.
 
     Args:
@@ -34,7 +35,7 @@ def ink(colour: NDArray[np.uint8], owner: NDArray[np.int32], distance: Single) -
     colour[where] = np.rint(below + share * (_INK - below)).astype(np.uint8)
 
 
-def set_off(colour: NDArray[np.uint8], owner: NDArray[np.int32], parts: Iterable[int]) -> None:
+def set_off(colour: Pixels, owner: NDArray[np.int32], parts: Iterable[int]) -> None:
     """Draw a thick line of a colour of its own around what is seen of some parts, in a picture: see `ink`."""
     from scipy.ndimage import binary_dilation, binary_erosion
 
@@ -46,7 +47,7 @@ def set_off(colour: NDArray[np.uint8], owner: NDArray[np.int32], parts: Iterable
             colour[rim] = _SET_OFF
 
 
-def cast(shadow_of: Iterable[Array], view: Array, ground: float, size: tuple[int, int]) -> NDArray[np.uint8]:
+def cast(shadow_of: Iterable[Array], view: Array, ground: float, size: tuple[int, int]) -> Pixels:
     """How bright a white ground is under what stands on it: uint8 (height, width), 255 out of the shadow.
 
     The corners of all triangles are carried along the light to the ground, drawn, and blurred a little.

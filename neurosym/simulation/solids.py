@@ -12,14 +12,13 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from neurosym.errors import InputError
 from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.shapes import Body, Box, Part
+from neurosym.support.arrays import Array, Numbers
 
-Array = NDArray[np.float64]
 BodiesKind = Literal["parts", "cubes"]
 #: What to do with meshes that are not convex: refuse them, or take them apart into convex pieces.
 MeshesKind = Literal["refuse", "decompose"]
@@ -51,7 +50,7 @@ class Solid:
     volume: float
     centre: Array
     inertia: Array
-    faces: NDArray[np.int64] | None = None
+    faces: Numbers | None = None
 
     @property
     def corners(self) -> Array:
@@ -149,7 +148,7 @@ def _solids(
 
 
 def _mesh_solids(
-    name: str, X_WB: Array, corners: Array, faces: NDArray[np.int64], meshes: MeshesKind, static: bool
+    name: str, X_WB: Array, corners: Array, faces: Numbers, meshes: MeshesKind, static: bool
 ) -> list[Solid]:
     import trimesh
 

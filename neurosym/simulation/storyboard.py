@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from neurosym.geometry.staging import Staging
 from neurosym.simulation.filming import DEFAULT_CAMERA, TOPS_CAMERA
 from neurosym.simulation.looks import Camera
-
-Array = NDArray[np.float64]
+from neurosym.support.arrays import Array
 
 #: So many degrees the camera turns towards the broad side of an assembly that is four times as long as wide.
 _TURN = 20.0

@@ -19,14 +19,12 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from neurosym.errors import NeurosymError
 from neurosym.simulation.client import Closeable
 from neurosym.simulation.looks import Camera, aimed
 from neurosym.simulation.shading import LIGHT
-
-Array = NDArray[np.float64]
+from neurosym.support.arrays import Array
 
 #: Pictures a second, at most.
 RATE = 30

@@ -8,21 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
 from math import sqrt
-from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from neurosym.errors import InputError, UnknownNameError
+from neurosym.geometry.assembly import Assembly
 from neurosym.simulation.bodies import Bodies, resting_frame
 from neurosym.simulation.client import Client, Closeable
 from neurosym.simulation.physics import MOVED_SHARE, REST, SETTLE_STEPS, BodyKey, Physics, Snapshot
 from neurosym.simulation.solids import BodiesKind, MeshesKind, RigidBody, matrix, rigid_bodies, typical_extent
-
-if TYPE_CHECKING:
-    from neurosym.geometry.assembly import Assembly
-
-Array = NDArray[np.float64]
+from neurosym.support.arrays import Array
 
 
 class World(Closeable):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
 from neurosym.geometry.staging import Staging
@@ -12,8 +11,7 @@ from neurosym.simulation.solids import RigidBody, Solid
 from neurosym.simulation.storyboard import best_camera, room_for
 from neurosym.simulation.window import HIDDEN, Shown, Spectator, Window
 from neurosym.simulation.world import World
-
-Array = NDArray[np.float64]
+from neurosym.support.arrays import Array, Numbers
 
 
 class WorldWindow(Spectator):
@@ -49,7 +47,7 @@ def _triangles(body: RigidBody) -> Array:
     return np.concatenate([points[faces] for faces, points in corners])
 
 
-def _faces(solid: Solid) -> NDArray[np.int64]:
+def _faces(solid: Solid) -> Numbers:
     """int64 (n, 3), outward: of the mesh as it is, or of the hull of its corners."""
     if solid.faces is not None:
         return solid.faces

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Numbers = NDArray[np.int64]
 Truths = NDArray[np.bool_]
+Pixels = NDArray[np.uint8]
 
 
 def bounds(points: Array) -> tuple[Array, Array]:

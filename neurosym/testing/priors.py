@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 import numpy as np
 
 from neurosym.errors import ContractError
+from neurosym.language.problem import Problem
 from neurosym.planning.order_scores import OrderScores
 from neurosym.planning.prior import Prior
-
-if TYPE_CHECKING:
-    from neurosym.language.problem import Problem
 
 #: Largest difference in log-probability (nats) between one problem asked alone and in a batch: networks compute
 #: batches in another order of additions.

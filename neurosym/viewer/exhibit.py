@@ -6,9 +6,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from neurosym.errors import NeurosymError
 from neurosym.geometry.step_motion import StepMotion
 from neurosym.language.problem import Problem
@@ -19,6 +16,7 @@ from neurosym.planning.order_scores import OrderScores
 from neurosym.planning.result import PlanResult, Status
 from neurosym.planning.staging import stage
 from neurosym.planning.validation import validate
+from neurosym.support.arrays import Pixels
 from neurosym.viewer.timeline import Timeline
 
 #: Makes a problem of options given by name.
@@ -121,7 +119,7 @@ class Exhibit:
     problem: Problem
     search: Search
     timeline: Timeline | None
-    pictures: NDArray[np.uint8] | None
+    pictures: Pixels | None
     notes: tuple[str, ...] = ()
 
     @property

@@ -9,10 +9,9 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-from numpy.typing import NDArray
 from PIL import Image
 
+from neurosym.support.arrays import Pixels
 from neurosym.viewer.facts import PartFacts
 
 if TYPE_CHECKING:
@@ -51,7 +50,7 @@ def some(names: Sequence[str]) -> str:
     return ", ".join(names[:12]) + (f" and {len(names) - 12} more" if len(names) > 12 else "")
 
 
-def pictures(views: NDArray[np.uint8] | None) -> str:
+def pictures(views: Pixels | None) -> str:
     """The observation, one picture a view."""
     if views is None or not len(views):
         return "<p>There are no reference pictures.</p>"
@@ -143,7 +142,7 @@ _STYLE = (
 )
 
 
-def as_data(picture: NDArray[np.uint8]) -> str:
+def as_data(picture: Pixels) -> str:
     """A picture, uint8 (H, W, 3), as a data URI."""
     file = io.BytesIO()
     Image.fromarray(picture).save(file, format="PNG", optimize=True)

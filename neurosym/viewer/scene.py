@@ -7,15 +7,14 @@ from collections.abc import Callable, Collection, Mapping
 
 import numpy as np
 import viser
-from numpy.typing import NDArray
 
 from neurosym.geometry.stability.spring_verdicts import ContactForces
 from neurosym.simulation.scene import part_colours
+from neurosym.support.arrays import Array
 from neurosym.viewer.solids import Solid, solids
 from neurosym.viewer.steps import HELD
 from neurosym.viewer.timeline import Timeline, floor_of
 
-Array = NDArray[np.float64]
 RGB = tuple[int, int, int]
 
 #: The largest extent of the work in the scene: cameras, lines and light need no thought of millimetres or metres.

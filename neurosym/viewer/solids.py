@@ -6,12 +6,10 @@ from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.shapes import Box
-
-Array = NDArray[np.float64]
+from neurosym.support.arrays import Array, Numbers, Truths
 
 #: Edges at which the surface bends by less than this (degrees) are not outlined: facets of something round.
 SHARP = 30.0
@@ -25,7 +23,7 @@ class Solid:
     """A part in the world: float64 (n, 3) vertices, int64 (m, 3) outward faces, float64 (k, 2, 3) sharp edges."""
 
     vertices: Array
-    faces: NDArray[np.int64]
+    faces: Numbers
     outline: Array
 
 
@@ -48,8 +46,8 @@ def _solid(assembly: Assembly, part: int) -> Solid:
 
 
 def _merged(
-    vertices: Array, faces: NDArray[np.int64], of_box: NDArray[np.bool_], grid: float
-) -> tuple[Array, NDArray[np.int64]]:
+    vertices: Array, faces: Numbers, of_box: Truths, grid: float
+) -> tuple[Array, Numbers]:
     """The same triangles with corners shared, and without the faces of boxes that cover one another.
 
     Args:
@@ -67,7 +65,7 @@ def _merged(
     return vertices[first], kept[solid]
 
 
-def _outline(vertices: Array, faces: NDArray[np.int64]) -> Array:
+def _outline(vertices: Array, faces: Numbers) -> Array:
     """float64 (k, 2, 3): edges of one face, of more than two, or of two that meet at an angle."""
     a, b, c = (vertices[faces[:, k]] for k in range(3))
     normal = np.cross(b - a, c - a)

@@ -6,13 +6,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from neurosym.simulation.client import Client
 from neurosym.simulation.solids import matrix, quaternion
 from neurosym.simulation.window import Shown
-
-Array = NDArray[np.float64]
+from neurosym.support.arrays import Array
 
 #: Numbers of the arm's seven joints, the two fingers, and the point between the fingertips.
 JOINTS = tuple(range(7))

@@ -11,7 +11,6 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from neurosym.errors import InputError
@@ -24,8 +23,7 @@ from neurosym.simulation.panda.hand import APPROACH, CAREFUL, Failed, Hand, lift
 from neurosym.simulation.panda.report import BuildReport, BuildSettings, Placement
 from neurosym.simulation.panda.watching import CellWindow
 from neurosym.simulation.scene import part_colours
-
-Array = NDArray[np.float64]
+from neurosym.support.arrays import Array
 
 #: How far below a block's top the fingertips' middle grasps, at most.
 DEPTH = 0.025

@@ -10,14 +10,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from neurosym.simulation.client import Client, Closeable
 from neurosym.simulation.panda.arm import PandaArm
 from neurosym.simulation.scene import RGB
 from neurosym.simulation.solids import matrix, quaternion
-
-Array = NDArray[np.float64]
+from neurosym.support.arrays import Array
 
 TIME_STEP = 1 / 240
 #: Small bodies that touch many others want more of the contact solver than Bullet's usual 50.

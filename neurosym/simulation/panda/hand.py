@@ -9,13 +9,11 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from neurosym.geometry.paths.joint_motion import plan_joint_motion
 from neurosym.simulation.panda.arm import HOME, WIDEST
 from neurosym.simulation.panda.cell import TIME_STEP, Cell, Load
-
-Array = NDArray[np.float64]
+from neurosym.support.arrays import Array
 
 #: Of each finger when it opens (newtons).
 OPENING_FORCE = 30.0

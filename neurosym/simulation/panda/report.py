@@ -6,13 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from neurosym.errors import InputError
 from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.shapes import boxes_part
-
-Array = NDArray[np.float64]
+from neurosym.support.arrays import Array
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from neurosym.simulation.drawing import drawn
 from neurosym.simulation.film_files import RATE
@@ -11,9 +10,7 @@ from neurosym.simulation.looks import Camera, aimed
 from neurosym.simulation.panda.cell import TIME_STEP, Cell
 from neurosym.simulation.shading import LIGHT
 from neurosym.simulation.window import Shown, Spectator, Window
-
-Array = NDArray[np.float64]
-Picture = NDArray[np.uint8]
+from neurosym.support.arrays import Array, Pixels
 
 #: From where the arm is watched: opposite it, a little from its left.
 CAMERA = Camera(38, 24, field_of_view=30.0)
@@ -58,7 +55,7 @@ class CellFilm:
     """
 
     def __init__(self, size: tuple[int, int] = (640, 480), speed: float = 4.0) -> None:
-        self.size, self.pictures = size, list[Picture]()
+        self.size, self.pictures = size, list[Pixels]()
         self._every, self._steps = max(1, round(speed / RATE / TIME_STEP)), 0
 
     def __call__(self, cell: Cell) -> None:
@@ -67,7 +64,7 @@ class CellFilm:
         self._steps += 1
 
 
-def picture_of(cell: Cell, size: tuple[int, int]) -> Picture:
+def picture_of(cell: Cell, size: tuple[int, int]) -> Pixels:
     """uint8 (height, width, 3): the cell as it is now, from `CAMERA`, without a window."""
     from PIL import Image
 
