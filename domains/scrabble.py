@@ -139,9 +139,7 @@ class ScrabbleFamily(ProblemFamily):
 
         return laid_out(problem.details["start"], plan)
 
-    def pictures(
-        self, problem: Problem, *, style: str = "easy", rng: np.random.Generator | None = None
-    ) -> Pixels:
+    def pictures(self, problem: Problem, *, style: str = "easy", rng: np.random.Generator | None = None) -> Pixels:
         """One view of the word, uint8 (1, 32, 192, 3)."""
         from domains.scrabble_drawing import draw_word, style_named
 

@@ -69,7 +69,5 @@ def all_slots_filled(world: Reference, state: State) -> Verdict:
 
 _t = tile("t")
 DOMAIN = Domain(
-    "scrabble",
-    fluents=[laid],
-    actions=[Action("lay", _t, pre=[~laid(_t), matches(_t)], eff=[laid(_t)], label="{t}")],
+    "scrabble", fluents=[laid], actions=[Action("lay", _t, pre=[~laid(_t), matches(_t)], eff=[laid(_t)], label="{t}")]
 )

@@ -202,9 +202,7 @@ class SomaFamily(ProblemFamily):
         rng = np.random.default_rng(problem.details["seed"])
         return render_views(problem.world, problem.details["pictures"], rng)
 
-    def pictures(
-        self, problem: Problem, *, style: str = "clean", rng: np.random.Generator | None = None
-    ) -> Pixels:
+    def pictures(self, problem: Problem, *, style: str = "clean", rng: np.random.Generator | None = None) -> Pixels:
         """Four views, top and three sides: uint8 (4, 64, 64, 3)."""
         return render_views(problem.world, style, rng or np.random.default_rng(0))
 

@@ -97,9 +97,7 @@ def demonstrate(
 def habit(problem: Problem) -> tuple[str, ...]:
     """The demonstrator's order: whatever may leave, the topmost piece first, ties by the order of the pieces."""
     world, search = problem.world, problem.ground()
-    heights = {
-        name: float(world.X_WB[world.owners == i, 2, 3].mean()) for i, name in enumerate(world.names)
-    }
+    heights = {name: float(world.X_WB[world.owners == i, 2, 3].mean()) for i, name in enumerate(world.names)}
     ranked = sorted(range(len(search.actions)), key=lambda a: (-round(heights[search.actions[a]], 6), a))
     state, order = search.initial, []
     while not search.is_goal(state):
@@ -115,9 +113,7 @@ def habit(problem: Problem) -> tuple[str, ...]:
     return tuple(order)
 
 
-def _labels(
-    family: SomaFamily, cells: Mapping[str, tuple[Cell, ...]]
-) -> tuple[Numbers, NDArray[np.float32]]:
+def _labels(family: SomaFamily, cells: Mapping[str, tuple[Cell, ...]]) -> tuple[Numbers, NDArray[np.float32]]:
     """For a cube in its 48 poses: the demonstrator's orders, int64 (48, 7), and the shares, float32 (48, 7, 7)."""
     key = hashlib.sha256(repr((LABELS_VERSION, sorted(cells.items()))).encode()).hexdigest()
     folder = cache_folder() / "soma-labels"
@@ -130,9 +126,7 @@ def _labels(
     return orders, shares
 
 
-def _count_labels(
-    family: SomaFamily, cells: dict[str, tuple[Cell, ...]]
-) -> tuple[Numbers, NDArray[np.float32]]:
+def _count_labels(family: SomaFamily, cells: dict[str, tuple[Cell, ...]]) -> tuple[Numbers, NDArray[np.float32]]:
     """Gravity tells only which way is up, so six problems answer for 48 poses."""
     swap = [LETTERS.index({"A": "B", "B": "A"}.get(name, name)) for name in LETTERS]
     known: dict[tuple[int, ...], tuple[Numbers, Array]] = {}

@@ -44,9 +44,7 @@ def symmetries() -> Numbers:
     return np.array(sorted(found, key=lambda m: -round(np.linalg.det(m))))
 
 
-def turned(
-    cells: dict[str, tuple[Cell, ...]], symmetry: Numbers, side: int = 3
-) -> dict[str, tuple[Cell, ...]]:
+def turned(cells: dict[str, tuple[Cell, ...]], symmetry: Numbers, side: int = 3) -> dict[str, tuple[Cell, ...]]:
     """A cube's pieces under a symmetry of the cube; under a reflection A and B change names."""
     mirrored = np.linalg.det(symmetry) < 0
     found = {}

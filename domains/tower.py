@@ -148,9 +148,7 @@ class TowerFamily(ProblemFamily):
         order = (*standing, *plan)
         return building(tower.built(order), standing, plan, {n: COLOURS[tower.kinds[n][0]] for n in order})
 
-    def pictures(
-        self, problem: Problem, *, style: str = "easy", rng: np.random.Generator | None = None
-    ) -> Pixels:
+    def pictures(self, problem: Problem, *, style: str = "easy", rng: np.random.Generator | None = None) -> Pixels:
         """One view from the side, uint8 (1, 64, 64, 3), of the tower as it is; `style` says how it is pictured."""
         return take_picture(problem.world, style, rng or np.random.default_rng(0))
 

@@ -54,9 +54,7 @@ def demonstrate(
         levels = [blocks[b].name for b in towers(variant)[number]]
         references.append(ReferenceTower.of(blocks, levels, draw_offsets(style, len(levels), own), frame=TALLEST))
         seeds.append(own)
-    pictures = take_pictures(
-        references, seeds, style=style, workers=workers or os.cpu_count() or 1, progress=progress
-    )
+    pictures = take_pictures(references, seeds, style=style, workers=workers or os.cpu_count() or 1, progress=progress)
     kinds = list(dict.fromkeys((b.colour, b.size) for b in blocks))
     return Demonstrations(
         pictures=pictures,

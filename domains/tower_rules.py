@@ -95,7 +95,5 @@ rests = Derived("rests", [block], _rests)
 finished = Derived("finished", [], _finished)
 
 _b = block("b")
-place = Action(
-    "place", _b, pre=[stocked(_b), unused(_b), matches(_b), rests(_b)], eff=[placed(_b)], label="{b}"
-)
+place = Action("place", _b, pre=[stocked(_b), unused(_b), matches(_b), rests(_b)], eff=[placed(_b)], label="{b}")
 TOWER = Domain("tower", fluents=[placed, stocked], actions=[place])

@@ -15,9 +15,7 @@ from neurosym.language.demonstrations import Demonstrations
 from neurosym.support.arrays import Array, Numbers, Truths
 
 
-def compare_orders(
-    predicted: ArrayLike, truth: Demonstrations, classes: Sequence[int]
-) -> dict[str, Array]:
+def compare_orders(predicted: ArrayLike, truth: Demonstrations, classes: Sequence[int]) -> dict[str, Array]:
     """How well orders agree with demonstrated ones, where interchangeable actions count as one.
 
     Args:

@@ -37,7 +37,7 @@ BLIND = "blind"
 #: What must be known of the paper's figures.
 _NOTES = {
     "soma": " The paper prints 51.55 and 54.95 as per cent; its authors' published evaluation suggests that these are "
-    "counts of 120 cubes, which would make them 43.0% and 45.8%.",
+    "counts of 120 cubes, which would make them 43.0% and 45.8%."
 }
 
 

@@ -93,11 +93,7 @@ class GroundProblem:
 
     def candidates(self, state: int) -> list[int]:
         """Indices of the actions whose fluents allow them in `state`."""
-        return [
-            i
-            for i, (pos, neg) in enumerate(zip(self._pos, self._neg))
-            if (state & pos) == pos and not state & neg
-        ]
+        return [i for i, (pos, neg) in enumerate(zip(self._pos, self._neg)) if (state & pos) == pos and not state & neg]
 
     def is_applicable(self, state: int, action: int) -> bool:
         """Whether `action` is one of the candidates in `state`."""
@@ -202,8 +198,8 @@ class GroundProblem:
         for i, goal in enumerate(self.problem.goal):
             if isinstance(goal.atom.predicate, Derived):
                 continue
-            stuck = goal.atom not in made if goal.positive else goal.atom in self.problem.init and (
-                goal.atom not in unmade
+            stuck = (
+                goal.atom not in made if goal.positive else goal.atom in self.problem.init and (goal.atom not in unmade)
             )
             if stuck:
                 raise DefinitionError(

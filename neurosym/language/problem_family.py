@@ -43,9 +43,7 @@ class ProblemFamily(Semantics, ABC):
         """Numbers of the problems of a part, as `problem` takes them; benchmarks rebuild problems from these."""
         raise NotImplementedError(f"the domain {self.name!r} does not number its problems")
 
-    def pictures(
-        self, problem: Problem, *, style: str = "clean", rng: np.random.Generator | None = None
-    ) -> Pixels:
+    def pictures(self, problem: Problem, *, style: str = "clean", rng: np.random.Generator | None = None) -> Pixels:
         """Pictures of the finished work, uint8 (V, H, W, 3)."""
         raise NotImplementedError(f"the domain {self.name!r} has no pictures")
 

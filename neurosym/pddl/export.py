@@ -73,9 +73,7 @@ def write_pddl(problem: Problem, directory: str | Path, *, seconds: float | None
     return as_pddl(problem, seconds=seconds).write(directory)
 
 
-def as_pddl(
-    problem: Problem, *, seconds: float | None = SECONDS, refuted: Sequence[Sequence[str]] = ()
-) -> PddlTask:
+def as_pddl(problem: Problem, *, seconds: float | None = SECONDS, refuted: Sequence[Sequence[str]] = ()) -> PddlTask:
     """A problem in PDDL.
 
     Args:

@@ -125,9 +125,7 @@ class Bodies:
             if key[0] != part:
                 continue
             position, turn = p.getBasePositionAndOrientation(number, physicsClientId=c)
-            p.resetBasePositionAndOrientation(
-                number, (np.asarray(position) + shift).tolist(), turn, physicsClientId=c
-            )
+            p.resetBasePositionAndOrientation(number, (np.asarray(position) + shift).tolist(), turn, physicsClientId=c)
             for other, i in self.numbers.items():
                 if other[0] != part and other[0] not in hit:
                     near = p.getClosestPoints(number, i, 0.0, physicsClientId=c)

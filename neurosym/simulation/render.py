@@ -177,9 +177,7 @@ def render_many(
 
 def scenes_of(jobs: Sequence[Job], colours: Mapping[str, RGB] | None) -> list[tuple[Scene, int]]:
     """The scenes of jobs, with their seeds."""
-    return [
-        (given if isinstance(given, Scene) else scene_of(given, colours), int(seed)) for given, seed in jobs
-    ]
+    return [(given if isinstance(given, Scene) else scene_of(given, colours), int(seed)) for given, seed in jobs]
 
 
 def render_chunks(
@@ -206,9 +204,7 @@ def _in_this_process(
             yield _draw(studio, chunk, style, size, cameras)
 
 
-def _render_chunk(
-    chunk: Sequence[tuple[Scene, int]], style: Style, size: int, cameras: Sequence[Camera]
-) -> Pixels:
+def _render_chunk(chunk: Sequence[tuple[Scene, int]], style: Style, size: int, cameras: Sequence[Camera]) -> Pixels:
     with PictureStudio() as studio:
         return _draw(studio, chunk, style, size, cameras)
 

@@ -79,9 +79,7 @@ class Scene:
         return found.digest()
 
 
-def scene_of(
-    assembly: Assembly, colours: Mapping[str, RGB] | None = None, *, frame: Array | None = None
-) -> Scene:
+def scene_of(assembly: Assembly, colours: Mapping[str, RGB] | None = None, *, frame: Array | None = None) -> Scene:
     """An assembly as the cameras see it.
 
     Args:
@@ -135,9 +133,7 @@ _TURNS = np.array(
 )
 
 
-def _faces(
-    assembly: Assembly, poses: Array, boxes: Numbers, scale: float
-) -> tuple[Array, Array, Numbers]:
+def _faces(assembly: Assembly, poses: Array, boxes: Numbers, scale: float) -> tuple[Array, Array, Numbers]:
     """Frames (n, 4, 4), half edges (n, 3) and owners (n,) of the boxes' faces, without those that cover each other."""
     half = assembly.bodies.box_sizes[boxes] * scale / 2
     R = poses[boxes, :3, :3]

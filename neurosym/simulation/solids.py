@@ -94,11 +94,7 @@ def typical_extent(assembly: Assembly) -> float:
 
 
 def rigid_bodies(
-    assembly: Assembly,
-    kind: BodiesKind,
-    scale: float,
-    clearance: float = 0.0,
-    meshes: MeshesKind = "refuse",
+    assembly: Assembly, kind: BodiesKind, scale: float, clearance: float = 0.0, meshes: MeshesKind = "refuse"
 ) -> tuple[RigidBody, ...]:
     """The bodies that a simulation of `assembly` moves, lengths multiplied by `scale`.
 
@@ -128,9 +124,7 @@ def rigid_bodies(
     return tuple(made)
 
 
-def _solids(
-    part: Part, body: Body, scale: float, clearance: float, meshes: MeshesKind, static: bool
-) -> list[Solid]:
+def _solids(part: Part, body: Body, scale: float, clearance: float, meshes: MeshesKind, static: bool) -> list[Solid]:
     X_WB = np.array(part.X_WP @ body.X_PB, dtype=np.float64)
     X_WB[:3, 3] *= scale
     R, corners = X_WB[:3, :3], body.shape.vertices * scale

@@ -137,11 +137,7 @@ class World(Closeable):
         self._bodies.step(steps)
 
     def settle(
-        self,
-        steps: int = SETTLE_STEPS,
-        *,
-        until_rest: bool = False,
-        watch: Callable[[], None] | None = None,
+        self, steps: int = SETTLE_STEPS, *, until_rest: bool = False, watch: Callable[[], None] | None = None
     ) -> int:
         """Let things fall for at most `steps`; with `until_rest`, stop once nothing moves.
 

@@ -45,9 +45,7 @@ def scores_table(scores: OrderScores | None, actions: Sequence[str], taken: Sequ
     return f"{drawn}<p class='quiet'>{legend}{shared}{left_out}</p>"
 
 
-def _by_class(
-    P: Array, actions: Sequence[str], classes: Sequence[int]
-) -> tuple[Array, list[str], dict[str, int]]:
+def _by_class(P: Array, actions: Sequence[str], classes: Sequence[int]) -> tuple[Array, list[str], dict[str, int]]:
     """A column a class, its probabilities summed; the columns' names; and the column of each action."""
     members: dict[int, list[int]] = {}
     for j, number in enumerate(classes):

@@ -45,9 +45,7 @@ def _solid(assembly: Assembly, part: int) -> Solid:
     return Solid(v, f, _outline(v, f))
 
 
-def _merged(
-    vertices: Array, faces: Numbers, of_box: Truths, grid: float
-) -> tuple[Array, Numbers]:
+def _merged(vertices: Array, faces: Numbers, of_box: Truths, grid: float) -> tuple[Array, Numbers]:
     """The same triangles with corners shared, and without the faces of boxes that cover one another.
 
     Args:

@@ -72,9 +72,7 @@ def picture_of(cell: Cell, size: tuple[int, int]) -> Pixels:
     view, projection, _ = aimed(ROOM, CAMERA, size)
     matrices = view.T.ravel().tolist(), projection.T.ravel().tolist()
     light = (10 * LIGHT).tolist()
-    colour, _, owners = drawn(
-        cell.client, large, *matrices, light=light, distance=3, shades=(0.6, 0.42, 0.0), shadow=0
-    )
+    colour, _, owners = drawn(cell.client, large, *matrices, light=light, distance=3, shades=(0.6, 0.42, 0.0), shadow=0)
     colour = colour.copy()
     colour[np.array(owners).reshape(large[1], large[0]) < 0] = 255
     return np.asarray(Image.fromarray(colour).reduce(_OVERSAMPLING))
