@@ -49,10 +49,8 @@ _DOWN = ((0.0, 0.0, -1.0),)
 class Stacks:
     """Which cubes stand over which, as bitsets.
 
-    Attributes:
-        own: one bitset of cubes a piece: its own.
-        over: one bitset of cubes a piece: all cubes of other pieces over any of its own.
-        owner: the number of the piece of each cube.
+    `own`: one bitset of cubes a piece: its own. `over`: one bitset of cubes a piece: all cubes of other pieces over any
+    of its own. `owner`: the number of the piece of each cube.
     """
 
     own: tuple[int, ...]

@@ -84,8 +84,7 @@ class ScrabbleFamily(ProblemFamily):
     ) -> Problem:
         """Any word of 3 to 6 letters that the first `tiles` tiles can lay.
 
-        Raises:
-            InputError: the word cannot be laid, or does not begin with the tiles that lie already.
+        Raises InputError: the word cannot be laid, or does not begin with the tiles that lie already.
         """
         from domains.scrabble_drawing import style_named
 

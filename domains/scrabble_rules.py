@@ -21,10 +21,8 @@ laid = Fluent("laid", tile)
 class Reference:
     """The word to lay, and what to lay it with.
 
-    Attributes:
-        word: its letters; slot i takes ``word[i]``.
-        tiles: names of the tiles, a letter and an instance.
-        start: how many slots are filled when the problem begins.
+    `word`: its letters; slot i takes ``word[i]``. `tiles`: names of the tiles, a letter and an instance. `start`: how
+    many slots are filled when the problem begins.
     """
 
     word: str

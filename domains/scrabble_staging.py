@@ -23,8 +23,7 @@ WOOD = (0.87, 0.72, 0.50)
 def laid_out(start: Sequence[str], plan: Sequence[str]) -> Staging:
     """The tiles that lie already, and those of a plan, from the first slot on.
 
-    Raises:
-        AssemblyError: there is no tile at all.
+    Raises AssemblyError: there is no tile at all.
     """
     names = (*start, *plan)
     parts = []

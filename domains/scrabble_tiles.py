@@ -61,11 +61,7 @@ def first_tiles(n: int) -> tuple[str, ...]:
 
 
 def checked_word(word: str, n: int) -> str:
-    """The word in small letters.
-
-    Raises:
-        InputError: it cannot be laid from the first `n` tiles; says why.
-    """
+    """The word in small letters. Raises InputError: it cannot be laid from the first `n` tiles; says why."""
     found = word.lower() if isinstance(word, str) else ""
     if not found or set(found) - set(COUNTS):
         raise InputError(f"Expected a word of the letters a to z; got {word!r}.")

@@ -124,8 +124,7 @@ class SomaFamily(ProblemFamily):
     ) -> Problem:
         """Any polycube puzzle, its pieces given as {name: [(x, y, z), ...]}, z up; options as for `problem`.
 
-        Raises:
-            AssemblyError: pieces that overlap, repeat a cell, are not connected, float or are empty.
+        Raises AssemblyError: pieces that overlap, repeat a cell, are not connected, float or are empty.
         """
         if not isinstance(cells, Mapping) or not cells:
             raise AssemblyError(f"Expected pieces as {{name: [(x, y, z), ...]}}, at least one; got {cells!r}.")

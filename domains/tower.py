@@ -127,8 +127,7 @@ class TowerFamily(ProblemFamily):
 
         Two thirds are ``"train"``, the others ``"test"``; ``"all"`` is all of the variant, in order.
 
-        Args:
-            by: ``"tower"``: the parts share no tower; ``"sequence"``: no colour sequence either.
+        `by`: ``"tower"``: the parts share no tower; ``"sequence"``: no colour sequence either.
         """
         return split_numbers(variant, part, split, by)
 
@@ -174,10 +173,8 @@ class TowerFamily(ProblemFamily):
     ) -> Demonstrations:
         """Demonstrations for a training recipe, see `domains.tower_demonstrations`.
 
-        Args:
-            variant: which towers.
-            by: how the parts are split.
-            count: only the first so many of the part, a random sample of it; None takes all.
+        `variant`: which towers. `by`: how the parts are split. `count`: only the first so many of the part, a random
+        sample of it; None takes all.
         """
         numbers = self.numbers(part, split=split, variant=variant, by=by)
         if count is not None and not 0 < count <= len(numbers):

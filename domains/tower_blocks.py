@@ -90,9 +90,8 @@ class ReferenceTower:
     ) -> ReferenceTower:
         """A reference tower, checked; without offsets it stands plumb.
 
-        Raises:
-            AssemblyError: no levels, a name that two blocks bear or two levels take, offsets of another shape.
-            UnknownNameError: a level of no known block.
+        Raises AssemblyError: no levels, a name that two blocks bear or two levels take, offsets of another shape;
+        UnknownNameError: a level of no known block.
         """
         names = [b.name for b in blocks]
         if twice := sorted({n for n in names if names.count(n) > 1}):
@@ -150,9 +149,7 @@ class ReferenceTower:
     def built(self, order: Sequence[str]) -> Assembly:
         """The tower that these blocks make, from the bottom up: parts on the levels' places, named after the blocks.
 
-        Raises:
-            UnknownNameError: no such block.
-            AssemblyError: more blocks than levels, or none.
+        Raises UnknownNameError: no such block; AssemblyError: more blocks than levels, or none.
         """
         if not 0 < len(order) <= len(self.levels):
             raise AssemblyError(f"Expected 1 to {len(self.levels)} blocks; got {len(order)}.")

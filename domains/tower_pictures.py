@@ -34,10 +34,8 @@ _OFFSET_STREAM = 0x0F_F5_E7
 class Untidiness:
     """How untidily towers are built, in shares of a block's edge: each is the most, drawn uniformly.
 
-    Attributes:
-        shift: of the whole tower, along x and along y, either way.
-        lean: of each level against the one below, in one direction, the same for the whole tower.
-        jitter: of each block by itself, in any direction.
+    `shift`: of the whole tower, along x and along y, either way. `lean`: of each level against the one below, in one
+    direction, the same for the whole tower. `jitter`: of each block by itself, in any direction.
     """
 
     shift: float = 0.0
@@ -50,11 +48,7 @@ SETTINGS = {"easy": Untidiness(), "hard": Untidiness(shift=0.4, lean=0.05, jitte
 
 
 def setting_named(name: str) -> str:
-    """The setting that a name or an alias stands for.
-
-    Raises:
-        UnknownNameError: no such setting.
-    """
+    """The setting that a name or an alias stands for. Raises UnknownNameError: no such setting."""
     found = ALIASES.get(name, name)
     if found not in SETTINGS:
         raise UnknownNameError("style of pictures", name, (*SETTINGS, *ALIASES))

@@ -32,11 +32,7 @@ _UNIQUE = tuple(Block(colour, colour) for colour in COLOURS)
 
 
 def blocks_of(variant: str) -> tuple[Block, ...]:
-    """The six blocks of a variant.
-
-    Raises:
-        UnknownNameError: no such variant.
-    """
+    """The six blocks of a variant. Raises UnknownNameError: no such variant."""
     if variant not in VARIANTS:
         raise UnknownNameError("variant", variant, VARIANTS)
     return _UNIQUE if variant == "unique" else _PAIRED

@@ -24,9 +24,7 @@ PictureShape = tuple[int, int, int, int]
 class Encoder(nn.Module, ABC):
     """Pictures -> features.
 
-    Attributes:
-        out_features: length of the feature vector.
-        places_shape: (V, R, C, 3), what `places` gives of each.
+    `out_features`: length of the feature vector. `places_shape`: (V, R, C, 3), what `places` gives of each.
     """
 
     out_features: int

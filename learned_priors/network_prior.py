@@ -83,8 +83,7 @@ class NetworkPrior(Prior):
     def read(self, pictures: ArrayLike) -> OrderScores | list[OrderScores]:
         """Order scores from pictures alone, uint8 (V, H, W, 3) of one piece of work, or a batch (M, V, H, W, 3).
 
-        Returns:
-            One `OrderScores` for one set of pictures, a list of M for a batch; columns named as in the training.
+        Returns one `OrderScores` for one set of pictures, a list of M for a batch; columns named as in the training.
         """
         batch, single = as_picture_batch(pictures)
         scores = self._weights.for_pictures(batch.shape[1:]).scores(batch)
@@ -94,12 +93,9 @@ class NetworkPrior(Prior):
         """The model's own order, as the paper compares it; unlike one of `OrderScores`, it may be wrong by itself.
 
         Plain ``bc`` and ``tcn-paper`` take the likeliest action of each step, so the same one may come twice. All
-        others take the likeliest number of steps, if that is unsure, and the best assignment of actions to them;
-        the full recipes sum the probabilities of interchangeable actions first.
-
-        Returns:
-            int64 (M, T) for a batch, (T,) for one: indices into the actions of the training; -1 after the last step.
-            Pictures as for `read`.
+        others take the likeliest number of steps, if that is unsure, and the best assignment of actions to them; the
+        full recipes sum the probabilities of interchangeable actions first. Returns int64 (M, T) for a batch, (T,) for
+        one: indices into the actions of the training; -1 after the last step. Pictures as for `read`.
         """
         batch, single = as_picture_batch(pictures)
         trained = self._weights.for_pictures(batch.shape[1:])
@@ -111,9 +107,8 @@ class NetworkPrior(Prior):
         """One `OrderScores` a problem, columns in the order of its actions; problems are read in batches.
 
         A problem with fewer actions than the network knows (a partial start) gets the last steps and its columns.
-
-        Raises:
-            InputError: a problem has no pictures, pictures of another shape, or actions that the network does not know.
+        Raises InputError: a problem has no pictures, pictures of another shape, or actions that the network does not
+        know.
         """
         groups: dict[TrainedNetwork, list[int]] = {}
         pictures: list[Pixels] = []
@@ -188,8 +183,7 @@ class NetworkPrior(Prior):
     def save(self, path: str | Path, *, notes: Mapping[str, Any] | None = None) -> Path:
         """Write the weights and their header to a ``.safetensors`` file (whole or not at all); returns its path.
 
-        Args:
-            notes: kept in the header under ``"demonstrations"``: where they came from (split, pictures, seed).
+        `notes`: kept in the header under ``"demonstrations"``: where they came from (split, pictures, seed).
         """
         own = self._weights.own
         if own is None:

@@ -20,8 +20,7 @@ from neurosym.support.arrays import Numbers, Pixels
 class TrainedNetwork:
     """A network, and what its weights say of themselves.
 
-    Attributes:
-        header: prior, domain, actions, network, training, and classes where actions are interchangeable.
+    `header`: prior, domain, actions, network, training, and classes where actions are interchangeable.
     """
 
     network: OrderNetwork

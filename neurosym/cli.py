@@ -77,8 +77,7 @@ def _options(
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line, and leave with one of `EXIT_CODES`.
 
-    Args:
-        arguments: as typed after `neurosym`; None takes those of the process.
+    `arguments`: as typed after `neurosym`; None takes those of the process.
     """
     try:
         app(args=None if arguments is None else list(arguments), prog_name="neurosym")

@@ -103,8 +103,7 @@ def search_and_check(
 ) -> list[PlanResult]:
     """One planner's results on an opened oracle (with k the k best plans, else one result), each plan replayed.
 
-    Raises:
-        ContractError: a plan does not survive its replay.
+    Raises ContractError: a plan does not survive its replay.
     """
     if k is not None and isinstance(planner, KBestPlanner):
         results = planner.plans(search, scores, k=k, budget=budget, rng=rng)

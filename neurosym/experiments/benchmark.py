@@ -105,10 +105,8 @@ class Run:
 class Outcome:
     """What a comparison gave.
 
-    Attributes:
-        runs: one a cell and problem, in the order of `Comparison.cells`.
-        image_blind: share of the problems on which the best fixed order of the training problems fails, or None.
-        image_blind_order: that order.
+    `runs`: one a cell and problem, in the order of `Comparison.cells`. `image_blind`: share of the problems on which
+    the best fixed order of the training problems fails, or None. `image_blind_order`: that order.
     """
 
     comparison: Comparison

@@ -67,9 +67,8 @@ def reproduce_study(
 def run_trial(trial: Trial, given: Study, epochs: int | None = None) -> dict[str, Any]:
     """Train and test one network, or calculate a baseline.
 
-    Returns:
-        What a journal keeps: ``"figures"``, metric -> mean over the test pictures, and ``"counts"``, as
-        `Counts.to_json` gives them (None for a baseline).
+    Returns what a journal keeps: ``"figures"``, metric -> mean over the test pictures, and ``"counts"``, as
+    `Counts.to_json` gives them (None for a baseline).
     """
     family = load_domain(given.domain)
     learner: Any = None if trial.method in BASELINES else load_prior(trial.method)

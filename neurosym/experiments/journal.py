@@ -20,8 +20,7 @@ def key_of(configuration: Any) -> str:
 class Journal:
     """Finished results by key. With a path of None it remembers nothing.
 
-    Args:
-        path: the file; made, with its folder, at the first `add`.
+    `path`: the file; made, with its folder, at the first `add`.
     """
 
     def __init__(self, path: str | Path | None) -> None:

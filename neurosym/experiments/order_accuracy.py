@@ -60,9 +60,7 @@ def seen_in(train: Demonstrations, test: Demonstrations) -> Truths:
 def averages(figures: Mapping[str, Array], seen: Truths) -> dict[str, float]:
     """Means over all pictures, and of `whole_sequence` and `per_step` over those seen in training and not, apart.
 
-    Args:
-        figures: metric -> float64 (M,).
-        seen: bool (M,).
+    `figures`: metric -> float64 (M,). `seen`: bool (M,).
     """
     means = {metric: float(values.mean()) for metric, values in figures.items()}
     for label, chosen in (("seen", seen), ("unseen", ~seen)):

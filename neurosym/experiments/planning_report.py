@@ -46,8 +46,7 @@ def write_results(
 ) -> None:
     """Write results.csv, report.md, and the figures, each as PNG and SVG, into `out`.
 
-    Args:
-        outcomes: (style, split) -> its comparison.
+    `outcomes`: (style, split) -> its comparison.
     """
     write_experiment(records, _figures(experiment, records, outcomes), partial(report, experiment, records), out)
 
@@ -87,8 +86,7 @@ def methods_figure(experiment: Experiment, records: pd.DataFrame, style: str) ->
 def report(experiment: Experiment, records: pd.DataFrame, drawn: Sequence[Drawn] = ()) -> str:
     """A page of Markdown: ours beside the paper's, means over splits with the deviation between splits.
 
-    Args:
-        drawn: figures that lie beside the page, named after their style of pictures.
+    `drawn`: figures that lie beside the page, named after their style of pictures.
     """
     lines = [
         f"# {experiment.domain}",

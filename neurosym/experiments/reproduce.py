@@ -87,8 +87,7 @@ class Experiment:
 def soma_experiment(scale: str = "quick") -> Experiment:
     """The paper's Table II: change it with `dataclasses.replace`.
 
-    Args:
-        scale: ``"quick"``, within 15 minutes on two cores, or ``"paper"``, as large as the paper's.
+    `scale`: ``"quick"``, within 15 minutes on two cores, or ``"paper"``, as large as the paper's.
     """
     if scale not in SCALES:
         raise UnknownNameError("scale", scale, SCALES)
@@ -145,8 +144,7 @@ def reproduce(
 def train_cell(experiment: Experiment, cell: Cell, checkpoint: Path | None) -> tuple[bytes, float]:
     """Train one network: the content of its weights file, and the seconds it took.
 
-    Args:
-        checkpoint: lets a training that was killed go on; it stays. None begins anew.
+    `checkpoint`: lets a training that was killed go on; it stays. None begins anew.
     """
     learner: Any = load_prior(cell.method)
     given = load_domain(experiment.domain).demonstrations(
@@ -164,8 +162,7 @@ def _train_all(
 ) -> Iterator[str]:
     """Train, and write each network's weights here, whoever trained it; a line about each.
 
-    Args:
-        keep: whether a network's checkpoint is kept beside its weights: other machines do not see them.
+    `keep`: whether a network's checkpoint is kept beside its weights: other machines do not see them.
     """
 
     def checkpoint(cell: Cell) -> Path | None:

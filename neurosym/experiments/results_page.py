@@ -28,12 +28,8 @@ _INTRODUCTION = (
 def write_results_page(folders: Sequence[Path], to: Path) -> Path:
     """Write the page `to`, a section a folder in the order given, and copy its figures to ``figures/`` beside it.
 
-    Args:
-        folders: of `neurosym reproduce`; each has a report.md.
-        to: the page, Markdown.
-
-    Raises:
-        InputError: no folder, one without a report or without a figure that its report shows, or two of one name.
+    `folders`: of `neurosym reproduce`; each has a report.md. `to`: the page, Markdown. Raises InputError: no folder,
+    one without a report or without a figure that its report shows, or two of one name.
     """
     if not folders:
         raise InputError("Expected at least one folder of `neurosym reproduce`; got none. Run one, or name it.")

@@ -90,9 +90,8 @@ class Study:
 class Results:
     """All trials of a study.
 
-    Attributes:
-        records: the lines of results.csv, with the columns `RECORD`.
-        counts: (pictures, method, n) -> those of all seeds, added up; baselines have none.
+    `records`: the lines of results.csv, with the columns `RECORD`. `counts`: (pictures, method, n) -> those of all
+    seeds, added up; baselines have none.
     """
 
     study: Study
@@ -144,8 +143,7 @@ def study_names() -> list[str]:
 def study(name: str, scale: str = "quick") -> Study:
     """The study of that name: change it with `dataclasses.replace`.
 
-    Args:
-        scale: ``"quick"``, within 15 minutes on two cores, or ``"paper"``, as large as the paper's.
+    `scale`: ``"quick"``, within 15 minutes on two cores, or ``"paper"``, as large as the paper's.
     """
     if name not in _QUICK:
         raise UnknownNameError("study", name, _QUICK)

@@ -42,9 +42,7 @@ def write_results(results: Results, out: Path) -> None:
 def report(results: Results, drawn: Sequence[Drawn] = ()) -> str:
     """A page of Markdown: what comes out, means over seeds with their deviation, the paper's figures beside them.
 
-    Args:
-        results: of all trials.
-        drawn: figures that lie beside the page.
+    `results`: of all trials. `drawn`: figures that lie beside the page.
     """
     study = results.study
     seeds = f"Mean over {study.seeds} seeds ± deviation" if study.seeds > 1 else "One seed"

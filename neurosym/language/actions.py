@@ -87,8 +87,7 @@ class Action:
 def moved_parts(effects: Sequence[Literal], names: Sequence[str]) -> tuple[tuple[str, ...], bool]:
     """Which of some names leave, by effects that only delete atoms of them; else which arrive, by such that only add.
 
-    Returns:
-        the names, and whether they arrive.
+    Returns the names, and whether they arrive.
     """
     added, deleted = ({a for e in effects if e.positive is sign for a in e.atom.args} for sign in (True, False))
     leaving = tuple(name for name in names if name in deleted - added)

@@ -17,8 +17,7 @@ from neurosym.language.terms import Atom, Condition, Derived, Fluent, Type, as_l
 class Domain:
     """A symbolic domain: fluents and actions. ``domain.problem(...)`` makes problems of it.
 
-    Raises:
-        DefinitionError: two fluents or actions of one name, or an action over a fluent that is not declared.
+    Raises DefinitionError: two fluents or actions of one name, or an action over a fluent that is not declared.
     """
 
     def __init__(self, name: str, *, fluents: Sequence[Fluent], actions: Sequence[Action]) -> None:

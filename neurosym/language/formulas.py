@@ -15,8 +15,7 @@ from neurosym.language.terms import Fluent, Literal
 class Way:
     """One way in which a predicate holds: all these literals do.
 
-    Attributes:
-        name: in words, for instance a direction; may be empty.
+    `name`: in words, for instance a direction; may be empty.
     """
 
     name: str
@@ -36,10 +35,8 @@ class Stands:
 
     There is no formula of bounded size for it: equilibrium is a linear program.
 
-    Attributes:
-        present: the fluent of one part that says which parts are there.
-        without: the part that is left out.
-        held: how many may be held.
+    `present`: the fluent of one part that says which parts are there. `without`: the part that is left out. `held`: how
+    many may be held.
     """
 
     present: Fluent

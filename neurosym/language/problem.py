@@ -47,9 +47,8 @@ class Simulation:
 class Problem:
     """A problem: a domain, a world, and what holds at first and at last. Made by `Domain.problem`.
 
-    Attributes:
-        world: whatever the domain is about, for instance an `Assembly`.
-        geometry: the object that answers questions about a world that is an `Assembly`; None for others.
+    `world`: whatever the domain is about, for instance an `Assembly`. `geometry`: the object that answers questions
+    about a world that is an `Assembly`; None for others.
     """
 
     domain: Domain

@@ -45,8 +45,7 @@ class PddlTask:
     def order(self, plan: str | Iterable[str]) -> tuple[str, ...]:
         """Names of action primitives, from a planner's plan: names of PDDL actions, or a plan file's text.
 
-        Raises:
-            UnknownNameError: a name that is no action of the domain file.
+        Raises UnknownNameError: a name that is no action of the domain file.
         """
         lines = plan.splitlines() if isinstance(plan, str) else plan
         names = (line.partition(";")[0].strip().strip("()").strip().lower() for line in lines)

@@ -11,9 +11,8 @@ from neurosym.language.terms import Literal
 class Mark:
     """A fact that the language does not have: that an action was or was not done, that a fall can no longer happen.
 
-    Attributes:
-        kind: "done" and "unused" (of an action), "averted" (of a fall), "kept" (of a part in the way of a fall).
-        label: which one.
+    `kind`: "done" and "unused" (of an action), "averted" (of a fall), "kept" (of a part in the way of a fall). `label`:
+    which one.
     """
 
     kind: str
@@ -46,9 +45,8 @@ class Operator:
 class Strips:
     """A problem as operators over facts.
 
-    Attributes:
-        sound: every plan is a plan of the problem. False: there was no time to find all falls.
-        notes: sentences on how it came about.
+    `sound`: every plan is a plan of the problem. False: there was no time to find all falls. `notes`: sentences on how
+    it came about.
     """
 
     operators: tuple[Operator, ...]

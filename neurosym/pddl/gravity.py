@@ -133,8 +133,7 @@ def _avert(
     A fall that could not happen before a removal can happen after it only if what is removed is among the parts
     that must be gone. One that can happen at first must be made impossible by the first removal already.
 
-    Args:
-        removals: names of parts, and what removes them; one part may have several.
+    `removals`: names of parts, and what removes them; one part may have several.
     """
     removers: dict[str, list[Instance]] = {}
     for part, instance in removals:

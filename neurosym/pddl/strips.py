@@ -23,12 +23,8 @@ from neurosym.pddl.instances import Instance, formulas_of, ground_instances, wit
 def strips(problem: Problem, *, seconds: float | None = None, refuted: Sequence[Sequence[str]] = ()) -> Strips:
     """Compile a problem without rules of its own.
 
-    Args:
-        seconds: for the falls, or for the table of states.
-        refuted: orders of action primitives in which something falls.
-
-    Raises:
-        InputError: a predicate without a formula in a problem of too many states, or a derived goal.
+    `seconds`: for the falls, or for the table of states. `refuted`: orders of action primitives in which something
+    falls. Raises InputError: a predicate without a formula in a problem of too many states, or a derived goal.
     """
     instances = ground_instances(problem)
     formulas = [formulas_of(problem, i) for i in instances]
@@ -56,8 +52,7 @@ def _compiled(
 ) -> Strips:
     """One operator a way of each instance, with what keeps up negative conditions, the order and single use.
 
-    Args:
-        helpers, kept: see `pddl_gravity.Weighed`.
+    `helpers, kept`: see `pddl_gravity.Weighed`.
     """
     names, initial = set(problem.actions), frozenset(problem.init)
     before = [(a, b) for a, b in problem.before if a in names and b in names]

@@ -33,8 +33,7 @@ class Table:
 def ways_from_table(problem: Problem, seconds: float | None = None) -> Table:
     """Look at every reachable state, and at every answer there.
 
-    Raises:
-        InputError: more than `MAX_STATES`, no time left, or a refusal that proves nothing.
+    Raises InputError: more than `MAX_STATES`, no time left, or a refusal that proves nothing.
     """
     end = None if seconds is None else time.monotonic() + seconds
     ground = problem.symbols

@@ -38,11 +38,7 @@ class SavedPlan:
     document: Mapping[str, Any]
 
     def account(self) -> Account:
-        """What the search did.
-
-        Raises:
-            InputError: it is not what `neurosym plan --out` writes.
-        """
+        """What the search did. Raises InputError: it is not what `neurosym plan --out` writes."""
         document = self.document
         try:
             return Account(
@@ -86,8 +82,7 @@ def read_search(path: str | Path) -> SavedPlan:
 def read_plan(path: str | Path) -> SavedPlan:
     """Read a plan.
 
-    Raises:
-        InputError: no such file, not what `neurosym plan --out` writes, of another schema, or without a plan in it.
+    Raises InputError: no such file, not what `neurosym plan --out` writes, of another schema, or without a plan in it.
     """
     document = read_document(Path(path))
     schema = document.get("schema")
@@ -117,8 +112,7 @@ def read_plan(path: str | Path) -> SavedPlan:
 def problem_of(document: Mapping[str, Any], path: str | Path = "plan.json") -> Problem:
     """The problem that a plan's file was made for, made again.
 
-    Raises:
-        InputError: the file does not say which problem it was.
+    Raises InputError: the file does not say which problem it was.
     """
     domain, options = document.get("domain"), document.get("options") or {}
     if not isinstance(domain, str) or not isinstance(options, dict):

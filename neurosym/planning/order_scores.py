@@ -142,8 +142,7 @@ class OrderScores:
     def restricted(self, actions: Sequence[str]) -> OrderScores:
         """The scores for a task of which some actions are done already: the last steps, the remaining columns.
 
-        Args:
-            actions: the names that are left, each one of `self.actions`.
+        `actions`: the names that are left, each one of `self.actions`.
         """
         if tuple(actions) == self.actions:
             return self

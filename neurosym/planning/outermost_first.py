@@ -23,8 +23,7 @@ class OutermostFirst(Prior):
     comes first, then the farthest from the middle; parts that never come free by themselves are last. Geometry alone,
     along the problem's directions: no pictures, and no question whether anything falls.
 
-    Args:
-        decay: how many steps away from its place in this order a part is e times less likely (steps).
+    `decay`: how many steps away from its place in this order a part is e times less likely (steps).
     """
 
     def __init__(self, *, decay: float = 2.0) -> None:
@@ -35,8 +34,7 @@ class OutermostFirst(Prior):
     def scores(self, problems: Sequence[Problem]) -> list[OrderScores]:
         """One table a problem, (n_actions, n_actions).
 
-        Raises:
-            InputError: the problem's world is no `Assembly`, or its actions are not named after parts.
+        Raises InputError: the problem's world is no `Assembly`, or its actions are not named after parts.
         """
         return [self._scores(problem) for problem in problems]
 

@@ -29,8 +29,7 @@ class Status(Enum):
 class Plan(tuple[str, ...]):
     """Names of actions in order: a tuple that knows how each of them is done.
 
-    Attributes:
-        motions: one an action (None: it moves nothing in space), or none at all.
+    `motions`: one an action (None: it moves nothing in space), or none at all.
     """
 
     motions: tuple[StepMotion | None, ...]
@@ -101,8 +100,7 @@ class PlanResult:
     def reversed(self) -> Plan:
         """The plan backwards, each motion reversed: how to put together what the plan takes apart.
 
-        Raises:
-            InputError: there is no plan.
+        Raises InputError: there is no plan.
         """
         if self.plan is None:
             raise InputError(f"Expected a result with a plan to reverse; got {self.status.name}.")

@@ -23,9 +23,7 @@ MOST_TICKS = 7
 class Curves:
     """One panel of curves.
 
-    Attributes:
-        title: what is on the vertical axis, with its unit.
-        values: method -> n -> a value a seed.
+    `title`: what is on the vertical axis, with its unit. `values`: method -> n -> a value a seed.
     """
 
     title: str
@@ -36,9 +34,7 @@ class Curves:
 class Spread:
     """How single sequences come out with growing n, of one method.
 
-    Attributes:
-        method: which.
-        right: n -> int64 (T + 1, T + 1), pictures by the number of steps and of those that are right.
+    `method`: which. `right`: n -> int64 (T + 1, T + 1), pictures by the number of steps and of those that are right.
     """
 
     method: str

@@ -31,11 +31,8 @@ def confusion_figure(title: str, labels: Sequence[str], confusion: Counts) -> Fi
 
     Shades grow with the square root of the share, so that rare confusions are seen.
 
-    Args:
-        title: of the figure.
-        labels: names of the K classes.
-        confusion: method -> int64 (K + 1, K + 1), steps by the class demonstrated and the class read. The last are
-            steps that are not there, which are drawn where there are some.
+    `title`: of the figure. `labels`: names of the K classes. `confusion`: method -> int64 (K + 1, K + 1), steps by the
+    class demonstrated and the class read. The last are steps that are not there, which are drawn where there are some.
     """
     from matplotlib.colors import PowerNorm
     from matplotlib.figure import Figure
@@ -90,9 +87,8 @@ def classes_figure(title: str, labels: Sequence[str], confusion: Counts) -> Figu
 def repeats_figure(title: str, repeats: Counts) -> Figure:
     """The share of steps and of sequences read wrong, by how many of a sequence's actions repeat an earlier class.
 
-    Args:
-        title: of the figure.
-        repeats: method -> int64 (T, 4), by the number of repetitions: steps, wrong steps, pictures, wrong pictures.
+    `title`: of the figure. `repeats`: method -> int64 (T, 4), by the number of repetitions: steps, wrong steps,
+    pictures, wrong pictures.
     """
     from matplotlib.figure import Figure
 

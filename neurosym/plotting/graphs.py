@@ -45,10 +45,8 @@ def blocking_figure(
     Parts on top are free; those in a frame hit one another, and can leave only together. Arrows that follow from others
     are left out. Of more than `MOST_NODES` parts a matrix is drawn: a row a part, dark where it hits the column's.
 
-    Args:
-        assembly: all parts are there.
-        directions: as `directions_for` takes them; default the axes.
-        title: what it is.
+    `assembly`: all parts are there. `directions`: as `directions_for` takes them; default the axes. `title`: what it
+    is.
     """
     geometry = AssemblyGeometry.of(assembly)
     assembly, graph = geometry.assembly, geometry.blocking(directions)

@@ -33,10 +33,8 @@ def iterations_figure(
     Bars are shares of runs at 0, 1, 2, ... iterations; a dot marks the mean, a diamond the paper's. Made for a
     column of `COLUMN` inches.
 
-    Args:
-        title: what was planned, with n.
-        iterations: planner -> prior -> int64 (runs,); all planners have the same priors. "none" is no prior.
-        paper: (planner, prior) -> the mean that is published.
+    `title`: what was planned, with n. `iterations`: planner -> prior -> int64 (runs,); all planners have the same
+    priors. "none" is no prior. `paper`: (planner, prior) -> the mean that is published.
     """
     from matplotlib.figure import Figure
 

@@ -30,10 +30,8 @@ def scores_figure(
     Frames are the likeliest order, dots the plan that was found. Shades grow with the square root, so that what is
     unlikely is seen. Where the number of steps is unsure, its probability stands at the right of the last step.
 
-    Args:
-        scores: of one prior, or name -> scores, all of the same actions.
-        plan: names of actions in order.
-        title: what the pictures show, or the problem's name.
+    `scores`: of one prior, or name -> scores, all of the same actions. `plan`: names of actions in order. `title`: what
+    the pictures show, or the problem's name.
     """
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import PowerNorm

@@ -45,9 +45,7 @@ def search_figure(result: PlanResult, *, title: str = "search") -> Figure:
     It is drawn from the refusals that a result keeps. A state that was accepted, and left before anything was refused
     after it, is not among them.
 
-    Args:
-        result: of any planner.
-        title: what was planned, and how.
+    `result`: of any planner. `title`: what was planned, and how.
     """
     from matplotlib.figure import Figure
 

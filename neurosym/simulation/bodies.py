@@ -87,11 +87,7 @@ class Bodies:
                 self.numbers[key] = number
 
     def remove(self, part: str) -> None:
-        """Take all bodies of a part out.
-
-        Raises:
-            UnknownNameError: a part that is not, or no longer, there.
-        """
+        """Take all bodies of a part out. Raises UnknownNameError: a part that is not, or no longer, there."""
         gone = [key for key in self.numbers if key[0] == part]
         if not gone:
             raise UnknownNameError("part in the scene", part, {name for name, _ in self.numbers})

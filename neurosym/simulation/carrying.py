@@ -27,9 +27,7 @@ PULL_WEIGHTS = 20.0
 class Carrier:
     """Takes the moving parts of one step along their path, from where they lie now.
 
-    Args:
-        world: where they are.
-        motion: the step; of its parts and those that make way, all that are there move.
+    `world`: where they are. `motion`: the step; of its parts and those that make way, all that are there move.
     """
 
     def __init__(self, world: World, motion: StepMotion) -> None:
@@ -72,11 +70,8 @@ class Carrier:
     def pull(self, after_step: Callable[[], None]) -> float:
         """Pull the moving parts along, out or in as the step goes, by a grip: friction and collisions included.
 
-        Args:
-            after_step: called after each time step.
-
-        Returns:
-            How far they stayed behind the path at the end, at most, in the assembly's length unit: far, if jammed.
+        `after_step`: called after each time step. Returns how far they stayed behind the path at the end, at most, in
+        the assembly's length unit: far, if jammed.
         """
         p, c, world = self._p, self._c, self.world
         inward = self.motion.arrives

@@ -76,8 +76,7 @@ def _flush() -> None:
 def pybullet() -> Any:
     """The `pybullet` module, imported on first use and without its banner.
 
-    Raises:
-        MissingDependencyError: PyBullet is not installed.
+    Raises MissingDependencyError: PyBullet is not installed.
     """
     global _module
     with _lock:
@@ -109,11 +108,9 @@ class Closeable(ABC):
 class Client(Closeable):
     """One connection to a simulator of its own, without a window (`neurosym.simulation.window` has one).
 
-    Use it as a context manager, or call `close`. Attribute `p` is the `pybullet` module and `id` what its
-    functions want as ``physicsClientId``.
-
-    Raises:
-        NeurosymError: PyBullet has no connection left (it allows about a thousand at a time).
+    Use it as a context manager, or call `close`. Attribute `p` is the `pybullet` module and `id` what its functions
+    want as ``physicsClientId``. Raises NeurosymError: PyBullet has no connection left (it allows about a thousand at a
+    time).
     """
 
     def __init__(self) -> None:

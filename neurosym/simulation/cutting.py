@@ -20,9 +20,7 @@ ON_PLANE = 1e-6
 def cut_into_convex(vertices: Array, faces: Numbers) -> list[Array] | None:
     """Corners of the convex pieces of a closed mesh, each float64 (n, 3); None when they would be too many.
 
-    Args:
-        vertices: float64 (n, 3).
-        faces: int64 (m, 3), outward.
+    `vertices`: float64 (n, 3). `faces`: int64 (m, 3), outward.
     """
     if len(faces) > MOST_FACES:
         return None

@@ -145,11 +145,7 @@ def _write_folder(pictures: Iterator[Pixels], path: Path) -> Path:
 
 
 def still(picture: Pixels, out: str | Path) -> Path:
-    """Write one picture as PNG, whole or not at all.
-
-    Raises:
-        InputError: a name that does not end in .png.
-    """
+    """Write one picture as PNG, whole or not at all. Raises InputError: a name that does not end in .png."""
     from PIL import Image
 
     path = Path(out)

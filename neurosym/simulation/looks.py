@@ -116,11 +116,7 @@ STYLES: Mapping[str, Style] = {
 
 
 def style_named(style: str | Style) -> Style:
-    """A style by its name, or as it is.
-
-    Raises:
-        UnknownNameError: no style of that name.
-    """
+    """A style by its name, or as it is. Raises UnknownNameError: no style of that name."""
     if isinstance(style, Style):
         return style
     if style not in STYLES:
@@ -176,10 +172,8 @@ def draw_look(style: Style, cameras: Sequence[Camera], colours: Array, rng: np.r
 def aimed(points: Array, camera: Camera, size: tuple[int, int]) -> tuple[Array, Array, tuple[float, float]]:
     """View and projection matrices, float64 (4, 4), and the near and far planes, so that all points show.
 
-    Args:
-        points: float64 (n, 3), in the scene.
-        camera: from which side, and how wide it sees; how far away it stands follows.
-        size: width and height in pixels.
+    `points`: float64 (n, 3), in the scene. `camera`: from which side, and how wide it sees; how far away it stands
+    follows. `size`: width and height in pixels.
     """
     turn = np.array(camera.view_matrix()).reshape(4, 4).T[:3, :3]
     seen = points @ turn.T

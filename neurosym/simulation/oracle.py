@@ -121,11 +121,7 @@ class PhysicsOracle(Closeable):
 
     @classmethod
     def of(cls, problem: Problem) -> PhysicsOracle:
-        """The oracle of a problem that says how physics would judge it.
-
-        Raises:
-            InputError: it does not.
-        """
+        """The oracle of a problem that says how physics would judge it. Raises InputError: it does not."""
         rule = problem.simulation
         if rule is None:
             raise InputError(
@@ -152,10 +148,8 @@ class PhysicsOracle(Closeable):
     def attempt(self, state: PhysicsState, action: int) -> Step[PhysicsState] | Rejection:
         """Simulate taking the part of `action` away, after the removals that `state` remembers.
 
-        The motion of an accepted step says along which direction the part leaves (rule ``"rigid"``).
-
-        Raises:
-            InputError: `state` holds a history that was itself refused, so that nothing can follow it.
+        The motion of an accepted step says along which direction the part leaves (rule ``"rigid"``). Raises InputError:
+        `state` holds a history that was itself refused, so that nothing can follow it.
         """
         symbols, history = state
         answer = self._answer((*history, action))

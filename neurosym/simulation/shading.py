@@ -23,10 +23,8 @@ _SHADE, _SOFT = 56.0, 0.008
 def ink(colour: Pixels, owner: NDArray[np.int32], distance: Single) -> None:
     """Draw dark lines into a picture: where one part ends and another begins, and where a surface folds.
 
-    Args:
-        colour: uint8 (height, width, 3), changed.
-        owner: int32 (height, width), the number of the part that is seen, -1: none.
-        distance: float32 (height, width), from the camera's plane.
+    `colour`: uint8 (height, width, 3), changed. `owner`: int32 (height, width), the number of the part that is seen,
+    -1: none. `distance`: float32 (height, width), from the camera's plane.
     """
     lines = _outlines(owner, distance)
     where = lines > 0

@@ -42,10 +42,8 @@ _FIELD_OF_VIEW, _SIZE = 90.0, (1024, 768)
 class Shown:
     """What one body looks like.
 
-    Attributes:
-        colour: RGB in 0..1.
-        triangles: float64 (n, 3, 3), in the body's frame; or
-        mesh: a file, with its pose in the body's frame: name, position (3,), quaternion (x, y, z, w).
+    `colour`: RGB in 0..1. `triangles`: float64 (n, 3, 3), in the body's frame; or `mesh`: a file, with its pose in the
+    body's frame: name, position (3,), quaternion (x, y, z, w).
     """
 
     colour: tuple[float, float, float]
@@ -102,10 +100,8 @@ class Window(Closeable):
     def advance(self, seconds: float, poses: Callable[[], Array]) -> None:
         """Let simulated time pass, and show where things are, if it is time for a picture. At once when it was closed.
 
-        Args:
-            seconds: of simulated time.
-            poses: called when a picture is due; float64 (n_bodies, 7), positions and quaternions (x, y, z, w);
-                `HIDDEN` for a body that is not there.
+        `seconds`: of simulated time. `poses`: called when a picture is due; float64 (n_bodies, 7), positions and
+        quaternions (x, y, z, w); `HIDDEN` for a body that is not there.
         """
         if not self.is_open:
             return

@@ -96,11 +96,7 @@ class World(Closeable):
         return sqrt(self.assembly.friction if self.physics.friction is None else self.physics.friction)
 
     def add(self, *parts: str) -> None:
-        """Put whole parts into the scene, where they rest when assembled.
-
-        Raises:
-            UnknownNameError: no such part.
-        """
+        """Put whole parts into the scene, where they rest when assembled. Raises UnknownNameError: no such part."""
         for part in parts:
             own = {key: resting_frame(body) for key, body in self._made.items() if key[0] == part}
             if not own:
@@ -141,11 +137,7 @@ class World(Closeable):
     ) -> int:
         """Let things fall for at most `steps`; with `until_rest`, stop once nothing moves.
 
-        Args:
-            watch: called after each time step.
-
-        Returns:
-            The steps taken.
+        `watch`: called after each time step. Returns the steps taken.
         """
         quiet = 0
         for done in range(1, steps + 1):
@@ -160,11 +152,7 @@ class World(Closeable):
         return steps
 
     def remove(self, *parts: str) -> None:
-        """Take whole parts out of the scene.
-
-        Raises:
-            UnknownNameError: a part that is not, or no longer, there.
-        """
+        """Take whole parts out of the scene. Raises UnknownNameError: a part that is not, or no longer, there."""
         for part in parts:
             self._bodies.remove(part)
 
@@ -189,9 +177,8 @@ class World(Closeable):
     def moved(self, threshold: float | None = None, *, since: Snapshot | None = None) -> dict[str, float]:
         """The parts that moved by more than `threshold`, with how far, in the assembly's length unit.
 
-        Args:
-            threshold: a length; None means `MOVED_SHARE` of a typical body.
-            since: compared with this; None means the initial poses.
+        `threshold`: a length; None means `MOVED_SHARE` of a typical body. `since`: compared with this; None means the
+        initial poses.
         """
         limit = MOVED_SHARE * self.unit if threshold is None else threshold
         found: dict[str, float] = {}
@@ -203,10 +190,8 @@ class World(Closeable):
     def overlaps(self, part: str, shift: Array, tolerance: float) -> tuple[str, ...]:
         """The parts that `part` would cut into, deeper than `tolerance`, if it were moved by `shift`.
 
-        Args:
-            part: name of a part that is there.
-            shift: float64 (3,), in the assembly's length unit.
-            tolerance: depth of overlap that counts as touch, same unit.
+        `part`: name of a part that is there. `shift`: float64 (3,), in the assembly's length unit. `tolerance`: depth
+        of overlap that counts as touch, same unit.
         """
         hit = self._bodies.overlaps(part, shift * self._scale, tolerance * self._scale)
         return tuple(name for name in self.assembly.names if name in hit)

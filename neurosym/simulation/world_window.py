@@ -17,12 +17,8 @@ from neurosym.support.arrays import Array, Numbers
 class WorldWindow(Spectator):
     """Shows a world as its time passes (a context manager).
 
-    Args:
-        world: what is simulated.
-        staging: the plan that is done there, for colours and for the room that its paths want.
-
-    Raises:
-        NeurosymError: there is no screen, or no OpenGL.
+    `world`: what is simulated. `staging`: the plan that is done there, for colours and for the room that its paths
+    want. Raises NeurosymError: there is no screen, or no OpenGL.
     """
 
     def __init__(self, world: World, staging: Staging) -> None:

@@ -40,8 +40,7 @@ class Burr:
 def read_layers(text: str) -> Cells:
     """Cells (x, y, z) of each letter in layers that stand side by side, the lowest first.
 
-    Raises:
-        InputError: rows with different numbers of layers, or no letter at all.
+    Raises InputError: rows with different numbers of layers, or no letter at all.
     """
     found: Cells = {}
     rows = [line.split() for line in text.strip().splitlines()]
@@ -124,11 +123,7 @@ BURRS = {burr.name: burr for burr in (STRAIGHT, PAIRS, LEVEL_4, BOLTS, RINGS)}
 
 
 def burr(name: str) -> Burr:
-    """One of them by its name.
-
-    Raises:
-        UnknownNameError: there is none of that name.
-    """
+    """One of them by its name. Raises UnknownNameError: there is none of that name."""
     if name not in BURRS:
         raise UnknownNameError("burr puzzle", name, BURRS)
     return BURRS[name]

@@ -88,12 +88,8 @@ def priors(toy: Toy, seed: int) -> Iterator[tuple[str, OrderScores | None]]:
 def check_planner(planner: str | Planner, *, seeds: int = 12) -> None:
     """Check that a planner keeps the contract of `neurosym.planning.planner.Planner` and what its traits claim.
 
-    Args:
-        planner: a registered name, or a planner.
-        seeds: random problems; more is slower and more searching.
-
-    Raises:
-        ContractError: what was expected and what came, on which problem and with which scores.
+    `planner`: a registered name, or a planner. `seeds`: random problems; more is slower and more searching. Raises
+    ContractError: what was expected and what came, on which problem and with which scores.
     """
     made = load_planner(planner)
     for toy in toys(seeds):

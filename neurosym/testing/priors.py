@@ -26,10 +26,8 @@ def check_prior(prior: Prior, problems: Sequence[Problem], *, pictures_only: boo
     alone (not on the batch, the order of the batch, or an earlier call); and that it leaves the problems' pictures
     and numpy's global generator as they were.
 
-    Args:
-        prior: what to check.
-        problems: at least two, different ones; include one with a partial start if your domain has them.
-        pictures_only: also check that the prior reads nothing of a problem but its pictures and names.
+    `prior`: what to check. `problems`: at least two, different ones; include one with a partial start if your domain
+    has them. `pictures_only`: also check that the prior reads nothing of a problem but its pictures and names.
     """
     if len(problems) < 2:
         raise ValueError(f"Expected at least two problems to check a prior with; got {len(problems)}.")

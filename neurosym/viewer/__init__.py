@@ -11,11 +11,7 @@ from neurosym.errors import MissingDependencyError
 
 
 def need_viser() -> None:
-    """Say how to get viser where it is absent.
-
-    Raises:
-        MissingDependencyError: viser is not installed.
-    """
+    """Say how to get viser where it is absent. Raises MissingDependencyError: viser is not installed."""
     try:
         import viser  # noqa: F401
     except ImportError as error:

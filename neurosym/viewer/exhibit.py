@@ -88,10 +88,8 @@ class Search:
     def saved(cls, saved: SavedPlan, scores: OrderScores | None) -> Search:
         """What a plan's file says of it. A plan that does not hold, by geometry asked anew, is none.
 
-        Plans that a simulation allowed are left to it (`neurosym replay`).
-
-        Raises:
-            InputError: the file's account of the search is not what `neurosym plan --out` writes.
+        Plans that a simulation allowed are left to it (`neurosym replay`). Raises InputError: the file's account of the
+        search is not what `neurosym plan --out` writes.
         """
         account = saved.account()
         status, sentence = account.status, account.status.sentence

@@ -30,8 +30,7 @@ PANEL = 400
 def export_page(exhibit: Exhibit, path: str | Path) -> Path:
     """Write a self-contained page, whole or not at all; its folder is made. Returns the path.
 
-    Raises:
-        InputError: a problem that has no parts in space, or a file name that does not end in .html.
+    Raises InputError: a problem that has no parts in space, or a file name that does not end in .html.
     """
     path = Path(path)
     check_name(path)

@@ -43,10 +43,7 @@ def part_facts(given: Assembly | AssemblyGeometry, name: str, there: Collection[
     """The facts about a part while only the parts named in `there` are in place.
 
     The first call for an `AssemblyGeometry` computes contacts and blocking between all pairs; later ones are bit
-    arithmetic.
-
-    Raises:
-        UnknownNameError: no such part.
+    arithmetic. Raises UnknownNameError: no such part.
     """
     geometry = AssemblyGeometry.of(given)
     assembly = geometry.assembly

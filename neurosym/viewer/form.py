@@ -74,11 +74,7 @@ class Form:
         self.takes.content = panels.styled(content)
 
     def asked(self) -> Query:
-        """What the form says.
-
-        Raises:
-            InputError: a field that is not what it should be.
-        """
+        """What the form says. Raises InputError: a field that is not what it should be."""
         seconds = self.seconds.value
         return Query(
             domain=self.domain.value,

@@ -85,8 +85,7 @@ class Page:
     def plan(self, query: Query, problem: Problem | None = None) -> None:
         """Plan in the background, the problem itself where it is made already; what comes out of it is shown.
 
-        Raises:
-            InputError: there is no such domain, planner or prior, or a search is under way.
+        Raises InputError: there is no such domain, planner or prior, or a search is under way.
         """
         with self._lock:
             if self.planning is not None and self.planning.running:

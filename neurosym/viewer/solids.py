@@ -48,8 +48,7 @@ def _solid(assembly: Assembly, part: int) -> Solid:
 def _merged(vertices: Array, faces: Numbers, of_box: Truths, grid: float) -> tuple[Array, Numbers]:
     """The same triangles with corners shared, and without the faces of boxes that cover one another.
 
-    Args:
-        of_box: bool (m,): which triangles are a box's; those come in pairs, a face each.
+    `of_box`: bool (m,): which triangles are a box's; those come in pairs, a face each.
     """
     _, first, which = np.unique(np.round(vertices / grid), axis=0, return_index=True, return_inverse=True)
     f = which.ravel()[faces]

@@ -41,11 +41,9 @@ class Source:
 def open_source(query: Query, cells: Mapping[str, Any] | None = None, reading: Reading | None = None) -> Source:
     """Open the domain, or the file at the path, that `query.domain` names; a path wins where no problem is named.
 
-    The domain may get cells, {name: [(x, y, z), ...]}, for a puzzle of the user's own; an assembly its reading.
-
-    Raises:
-        UnknownNameError: neither a domain nor a path.
-        InputError: a file that is neither a plan nor an assembly; a reading with anything but an assembly.
+    The domain may get cells, {name: [(x, y, z), ...]}, for a puzzle of the user's own; an assembly its reading. Raises
+    UnknownNameError: neither a domain nor a path; InputError: a file that is neither a plan nor an assembly; a reading
+    with anything but an assembly.
     """
     path, reading = Path(query.domain), reading or Reading()
     if path.exists() and query.number is None and cells is None:

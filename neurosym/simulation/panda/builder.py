@@ -87,8 +87,7 @@ def build_with_panda(
 def starting_places(names: Sequence[str], sizes: Mapping[str, Array], rng: np.random.Generator) -> dict[str, Array]:
     """Blocks in rows to the left and the right of the arm, a little askew: name -> float64 (4, 4), metres.
 
-    Raises:
-        InputError: more blocks than there is room for.
+    Raises InputError: more blocks than there is room for.
     """
     spots = [(x, side * y) for y in (0.20, 0.33) for x in (0.36, 0.49, 0.62) for side in (1, -1)]
     if len(names) > len(spots):

@@ -136,10 +136,7 @@ class Cell(Closeable):
     def is_free(self, q: Array, load: Load | None = None, ignored: Collection[str] = ()) -> bool:
         """Whether the arm, and what it carries, would touch nothing at a configuration: to be asked in thought only.
 
-        Args:
-            q: float64 (7,).
-            load: what it carries.
-            ignored: names of blocks that the arm may touch.
+        `q`: float64 (7,). `load`: what it carries. `ignored`: names of blocks that the arm may touch.
         """
         p, c, arm = self._p, self._c, self.arm
         arm.put(q)

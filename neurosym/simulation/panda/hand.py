@@ -67,10 +67,8 @@ class Hand:
     ) -> tuple[Array, list[Array]] | None:
         """The first of some tool poses that the arm reaches straight from above, and joints on the way down to it.
 
-        Args:
-            load: what the arm carries.
-            ignored: names of blocks that the arm may touch.
-            unasked: so many configurations at the end of the way may touch something.
+        `load`: what the arm carries. `ignored`: names of blocks that the arm may touch. `unasked`: so many
+        configurations at the end of the way may touch something.
         """
         arm = self.thought.arm
         spread = np.array([1.0, 0.5, 1.2, 0.4, 1.2, 0.5, 0.6])
@@ -89,11 +87,7 @@ class Hand:
         return None
 
     def transit(self, goal: Array, load: Load | None, where: str) -> None:
-        """Go to a configuration, past everything.
-
-        Raises:
-            Failed: no free motion was found to get `where`.
-        """
+        """Go to a configuration, past everything. Raises Failed: no free motion was found to get `where`."""
         path = self._planned(self.world.arm.joints, goal, load)
         if path is None:
             raise Failed(f"No free motion of the arm was found to get {where}.")
@@ -150,8 +144,7 @@ class Hand:
     def close(self, name: str, width: float) -> None:
         """Take hold of a block that is so wide between the fingers.
 
-        Raises:
-            Failed: both fingers do not touch it then.
+        Raises Failed: both fingers do not touch it then.
         """
         self.world.arm.squeeze(max(0.0, width - PRESS), self.force)
         self.wait(180)

@@ -82,11 +82,7 @@ class BuildReport:
         return self.ok
 
     def built(self) -> Assembly:
-        """The blocks that stand in their place, exactly as they stand, for pictures.
-
-        Raises:
-            InputError: none does.
-        """
+        """The blocks that stand in their place, exactly as they stand, for pictures. Raises InputError: none does."""
         if not self.standing:
             raise InputError("Expected at least one block that stands in its place; none does.")
         parts = [boxes_part(n, np.zeros((1, 3)), self.sizes[n], self.poses[n]) for n in self.standing]

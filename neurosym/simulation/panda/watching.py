@@ -24,8 +24,7 @@ _OVERSAMPLING = 2
 class CellWindow(Spectator):
     """Shows a cell in a window, in real time (a context manager).
 
-    Raises:
-        NeurosymError: there is no screen, or no OpenGL.
+    Raises NeurosymError: there is no screen, or no OpenGL.
     """
 
     def __init__(self, cell: Cell) -> None:
@@ -46,12 +45,8 @@ class CellWindow(Spectator):
 class CellFilm:
     """Pictures of a cell while time passes, `RATE` of them a second of film; to be called after each time step.
 
-    Args:
-        size: width and height in pixels, even numbers.
-        speed: seconds that pass in a second of film.
-
-    Attributes:
-        pictures: uint8 (height, width, 3) each.
+    `size`: width and height in pixels, even numbers. `speed`: seconds that pass in a second of film. `pictures`: uint8
+    (height, width, 3) each.
     """
 
     def __init__(self, size: tuple[int, int] = (640, 480), speed: float = 4.0) -> None:
