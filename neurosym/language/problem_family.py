@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from neurosym.language.demonstrations import Demonstrations
-from neurosym.language.domain import Domain
-from neurosym.language.problem import Problem
 from neurosym.language.semantics import Semantics
 from neurosym.support.arrays import Pixels
 from neurosym.support.progress import Progress as Progress
+
+if TYPE_CHECKING:
+    from neurosym.language.demonstrations import Demonstrations
+    from neurosym.language.domain import Domain
+    from neurosym.language.problem import Problem
 
 
 class ProblemFamily(Semantics, ABC):

@@ -5,14 +5,17 @@ from __future__ import annotations
 import zlib
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from neurosym.errors import InputError
-from neurosym.language.problem import Problem
 from neurosym.planning.order_scores import OrderScores
 from neurosym.support.arrays import Pixels
+
+if TYPE_CHECKING:
+    from neurosym.language.problem import Problem
 
 
 class Prior(ABC):

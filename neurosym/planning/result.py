@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from enum import Enum
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from neurosym.errors import ContractError, InputError
 from neurosym.geometry.step_motion import StepMotion
-from neurosym.language.explanation import WhyNot
 from neurosym.language.search_problem import Rejection
+
+if TYPE_CHECKING:
+    from neurosym.language.explanation import WhyNot
 
 
 class Status(Enum):
