@@ -36,20 +36,16 @@ def frames(
     camera: Camera | None = None,
     progress: Progress | None = None,
 ) -> Iterator[Pixels]:
-    """Pictures of a plan, one after another, `RATE` a second.
+    """Pictures of a plan, one after another, `RATE` a second: uint8 (height and a line of words, width, 3).
 
     What leaves moves along its path and then is gone; what arrives comes in along it. What made way goes back. Parts
     that are held are set off by a thick line. A group that left together is taken apart by itself.
 
     Args:
-        staging: the plan in space.
         title: stands below the first and the last picture.
         size: width and height in pixels, without the words below.
         camera: from which side; None takes `best_camera`.
         progress: called with (done, total).
-
-    Yields:
-        uint8 (height and a line of words, width, 3).
     """
     colours, count = part_colours(staging), len(staging.motions)
     moving, held, ends = pace(count)

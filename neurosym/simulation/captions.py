@@ -16,17 +16,13 @@ _PAPER, _TEXT, _FAINT = (255, 255, 255), (38, 38, 46), (214, 214, 220)
 def captioned(
     picture: Pixels, text: str, *, note: str = "", colour: RGB | None = None, progress: float | None = None
 ) -> Pixels:
-    """The picture with a line of words below it.
+    """The picture with a line of words below it: uint8 (taller, width, 3), of an even height, as video wants it.
 
     Args:
-        picture: uint8 (height, width, 3).
         text: on the left; what does not fit is cut, with an ellipsis.
         note: on the right, fainter.
         colour: of a small square before the text, RGB in 0..1; None leaves it out.
         progress: 0..1, the length of a bar between picture and words; None leaves it out.
-
-    Returns:
-        uint8 (taller, width, 3); heights are even, as video wants them.
     """
     from PIL import Image, ImageDraw
 

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from neurosym.simulation.client import Client
 from neurosym.simulation.solids import RigidBody, quaternion
 from neurosym.support.arrays import Array
 
@@ -16,22 +15,20 @@ from neurosym.support.arrays import Array
 MOST_JOINED = 16
 
 
-def collision_shape(client: Client, body: RigidBody, shapes: dict[tuple[float, ...], int], folder: Path) -> int:
+def collision_shape(p: Any, body: RigidBody, shapes: dict[tuple[float, ...], int], folder: Path) -> int:
     """The number of a collision shape in the body's centre-of-mass frame.
 
     Args:
-        client: where it is made.
-        body: what it is made of.
+        p: the simulator.
+        body: what the shape is made of.
         shapes: half edges -> shape, of single boxes made before: those of one size share theirs.
         folder: for the files that PyBullet wants; they may go once the shape is there.
     """
-    p: Any = client.p
-    c = client.id
     first = body.solids[0]
     if len(body.solids) == 1 and first.half is not None:
         size = tuple(first.half.tolist())
         if size not in shapes:
-            shapes[size] = p.createCollisionShape(p.GEOM_BOX, halfExtents=size, physicsClientId=c)
+            shapes[size] = p.createCollisionShape(p.GEOM_BOX, halfExtents=size)
         return shapes[size]
     X_CW = np.linalg.inv(body.X_WC)
     if len(body.solids) == 1 and first.faces is not None:
@@ -42,13 +39,12 @@ def collision_shape(client: Client, body: RigidBody, shapes: dict[tuple[float, .
                 vertices=corners.tolist(),
                 indices=first.faces.ravel().tolist(),
                 flags=p.GEOM_FORCE_CONCAVE_TRIMESH,
-                physicsClientId=c,
             )
         )
     if len(body.solids) > MOST_JOINED:
         # From a file with an object a piece it makes a compound of hulls, as many as there are.
         hulls = [solid.corners @ X_CW[:3, :3].T + X_CW[:3, 3] for solid in body.solids]
-        return int(p.createCollisionShape(p.GEOM_MESH, fileName=_obj(hulls, folder), physicsClientId=c))
+        return int(p.createCollisionShape(p.GEOM_MESH, fileName=_obj(hulls, folder)))
     kinds, halves, files, positions, turns = [], [], [], [], []
     for solid in body.solids:
         X_CB = X_CW @ solid.X_WB
@@ -64,7 +60,6 @@ def collision_shape(client: Client, body: RigidBody, shapes: dict[tuple[float, .
             fileNames=files,
             collisionFramePositions=positions,
             collisionFrameOrientations=turns,
-            physicsClientId=c,
         )
     )
 

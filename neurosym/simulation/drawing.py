@@ -59,7 +59,6 @@ def drawn(
         lightDiffuseCoeff=diffuse,
         lightSpecularCoeff=specular,
         renderer=p.ER_TINY_RENDERER,
-        physicsClientId=client.id,
         **options,
     )
     # A PyBullet built without numpy hands out a flat tuple.

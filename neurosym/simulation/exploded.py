@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from neurosym.errors import InputError
+from neurosym.geometry.rigid_motions import shifted
 from neurosym.geometry.staging import Staging
 from neurosym.simulation.captions import captioned, label
 from neurosym.simulation.filming import FilmSet
@@ -24,21 +25,11 @@ MOST_NAMES = 60
 
 
 def explode(staging: Staging, *, spread: float = 1.0) -> dict[str, Array]:
-    """Where the parts are in an exploded view.
+    """Where the parts are in an exploded view: part name -> float64 (3,), by how much it is shifted.
 
     With motions, backwards: the part that leaves last stays, and each other one goes along its way out until its
     bounds are clear of all that are placed by then. Parts without a straight way out, and all parts of a staging
-    without motions, go away from the middle.
-
-    Args:
-        staging: the plan in space; without motions the assembly alone.
-        spread: how far apart: 1 as described, 0 not at all.
-
-    Returns:
-        part name -> float64 (3,), by how much it is shifted.
-
-    Raises:
-        InputError: a spread below 0.
+    without motions, go away from the middle. `spread`: how far apart: 1 as described, 0 not at all.
     """
     if not np.isfinite(spread) or spread < 0:
         raise InputError(f"Expected a spread of 0 or more; got {spread!r}.")
@@ -76,24 +67,17 @@ def exploded_view(
     title: str = "",
     names: bool = True,
 ) -> Pixels:
-    """A picture of the parts pulled apart: see `explode`.
+    """A picture of the parts pulled apart (see `explode`): uint8 (height and a line of words, width, 3).
 
     Args:
         size: width and height in pixels, without the words below.
         camera: from which side; None takes `best_camera`.
-        title: stands below.
         names: whether each part's name is written on it (up to `MOST_NAMES` parts, and unless they bear pictures).
-
-    Returns:
-        uint8 (height and a line of words, width, 3).
     """
     shifts = explode(staging, spread=spread)
     bounds = dict(zip(staging.assembly.names, staging.assembly.part_bounds))
     corners = [np.array(np.meshgrid(*bounds[name].T)).reshape(3, -1).T + shift for name, shift in shifts.items()]
-    where = {}
-    for name, shift in shifts.items():
-        where[name] = np.eye(4)
-        where[name][:3, 3] = shift
+    where = {name: shifted(shift) for name, shift in shifts.items()}
     with FilmSet(
         staging.assembly,
         part_colours(staging),
@@ -105,8 +89,7 @@ def exploded_view(
     ) as film:
         picture = film.picture(staging.assembly.names, where)
         if names and not staging.tops and len(shifts) <= MOST_NAMES:
-            seen = film.seen_at(staging.assembly.names, where)
-            picture = label(picture, seen)
+            picture = label(picture, film.seen_at(staging.assembly.names, where))
     count = len(shifts)
     return captioned(picture, title or "exploded view", note=f"{count} part{'s' if count != 1 else ''}")
 

@@ -36,11 +36,7 @@ def write_film(pictures: Iterator[Pixels], out: str | Path) -> Path:
         MissingDependencyError: .mp4 without the extra `video`.
     """
     path = Path(out)
-    if path.suffix.lower() == ".gif":
-        return _write_gif(pictures, path)
-    if path.suffix.lower() == ".mp4":
-        return _write_mp4(pictures, path)
-    return _write_folder(pictures, path)
+    return {".gif": _write_gif, ".mp4": _write_mp4}.get(path.suffix.lower(), _write_folder)(pictures, path)
 
 
 def check_film(out: str | Path) -> None:

@@ -115,7 +115,7 @@ class FilmSet(Closeable):
                 position = np.full(3, -_AWAY)
             at = position.tolist()
             for body in (number, *([self._tops[name]] if name in self._tops else [])):
-                self._p.resetBasePositionAndOrientation(body, at, turn, physicsClientId=self._client.id)
+                self._p.resetBasePositionAndOrientation(body, at, turn)
 
     def seen_at(
         self, shown: Collection[str], where: Mapping[str, Array] | None = None
@@ -185,7 +185,7 @@ class FilmSet(Closeable):
         return colour, distance, owner
 
     def _part(self, assembly: Assembly, number: int, colours: Mapping[str, RGB]) -> int:
-        p, c = self._p, self._client.id
+        p = self._p
         triangles = []
         for i in np.flatnonzero(assembly.owners == number):
             corners = (assembly.bodies.vertices(int(i)) - self._middle) * self._scale
@@ -193,7 +193,7 @@ class FilmSet(Closeable):
         name = assembly.names[number]
         self._triangles[name] = np.concatenate(triangles)
         visual = self._visual(self._triangles[name], [*colours[name], 1.0])
-        return int(p.createMultiBody(0, -1, visual, physicsClientId=c))
+        return int(p.createMultiBody(0, -1, visual))
 
     def _top(self, name: str, picture: Pixels) -> int:
         """A sheet that lies on a part's bounds, with a picture on it."""
@@ -205,16 +205,15 @@ class FilmSet(Closeable):
         sheet = np.array([(x, y, z), (right, y, z), (right, back, z), (x, back, z)])[[0, 1, 2, 0, 2, 3]]
         uv = np.array([(0, 0), (1, 0), (1, 1), (0, 1)])[[0, 1, 2, 0, 2, 3]]
         visual = self._visual(sheet.reshape(-1, 3, 3), [1.0, 1.0, 1.0, 1.0], uvs=uv.tolist())
-        number = int(self._p.createMultiBody(0, -1, visual, physicsClientId=self._client.id))
+        number = int(self._p.createMultiBody(0, -1, visual))
         height, width = picture.shape[:2]
         smooth = Image.fromarray(picture).resize((_FINER * width, _FINER * height), Image.Resampling.LANCZOS)
         with tempfile.TemporaryDirectory(prefix="neurosym-") as folder:
             smooth.save(path := Path(folder) / "top.png")
-            texture = self._p.loadTexture(str(path), physicsClientId=self._client.id)
-        self._p.changeVisualShape(number, -1, textureUniqueId=texture, physicsClientId=self._client.id)
+            texture = self._p.loadTexture(str(path))
+        self._p.changeVisualShape(number, -1, textureUniqueId=texture)
         return number
 
     def _visual(self, triangles: Array, rgba: list[float], **options: Any) -> int:
         options |= flat_shaded(triangles)
-        c = self._client.id
-        return int(self._p.createVisualShape(self._p.GEOM_MESH, rgbaColor=rgba, physicsClientId=c, **options))
+        return int(self._p.createVisualShape(self._p.GEOM_MESH, rgbaColor=rgba, **options))

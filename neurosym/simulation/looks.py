@@ -139,14 +139,7 @@ class Look:
 
 
 def draw_look(style: Style, cameras: Sequence[Camera], colours: Array, rng: np.random.Generator) -> Look:
-    """Draw a look; how many numbers are drawn depends on the counts of cameras and colours only.
-
-    Args:
-        style: what may vary.
-        cameras: the cameras to start from.
-        colours: float64 (n_parts, 3), RGB in 0..1.
-        rng: the only source of chance.
-    """
+    """Draw a look; how many numbers are drawn depends on the counts of cameras and colours, (n_parts, 3), only."""
     azimuth, elevation = np.radians([rng.uniform(*style.light_azimuth), rng.uniform(*style.light_elevation)])
     direction = (np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation))
     turned = tuple(

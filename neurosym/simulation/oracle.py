@@ -21,6 +21,7 @@ from neurosym.language.search_problem import Rejection, Step
 from neurosym.simulation.client import Closeable
 from neurosym.simulation.physics import MOVED_SHARE, SETTLE_STEPS, Physics, Snapshot
 from neurosym.simulation.world import World
+from neurosym.support.arrays import Array
 from neurosym.support.words import joined
 
 #: The state of a problem under physics: the symbols, and the actions done so far, in order.
@@ -135,8 +136,6 @@ class PhysicsOracle(Closeable):
         """Close the simulator; closing twice does nothing. An oracle that is forgotten closes itself."""
         self._world.close()
 
-    # -- what planners use ------------------------------------------------------------------------------------
-
     def is_goal(self, state: PhysicsState) -> bool:
         """Whether the symbols of `state` fulfil the goal."""
         return self._base.is_goal(state[0])
@@ -156,8 +155,6 @@ class PhysicsOracle(Closeable):
         if isinstance(answer, Rejection):
             return answer
         return Step((self._base.apply(symbols, action), (*history, action)), answer.motion)
-
-    # -- simulation -------------------------------------------------------------------------------------------
 
     def _answer(self, history: tuple[int, ...]) -> Rejection | _Accepted:
         known = self._answers.get(history)
@@ -221,10 +218,10 @@ class PhysicsOracle(Closeable):
         axes = world.assembly.axes
         blockers: dict[str, None] = {}
         for direction in axes[axes[:, 2] > -1e-9]:
-            found = self._in_the_way(part, direction)
-            if not found:
+            hit = self._in_the_way(part, direction)
+            if not hit:
                 break
-            blockers.update(dict.fromkeys(found))
+            blockers.update(dict.fromkeys(hit))
         else:
             names = tuple(blockers)
             return Rejection(f"{part} cannot leave along a straight line: {joined(names)} in its way.", names)
@@ -232,14 +229,14 @@ class PhysicsOracle(Closeable):
         world.settle()
         moved = world.moved(since=before)
         if moved:
-            said = joined(tuple(f"{name} by {distance:.2g}" for name, distance in moved.items()))
-            return Rejection(f"Parts moved: {said}.", tuple(moved))
+            distances = joined(tuple(f"{name} by {distance:.2g}" for name, distance in moved.items()))
+            return Rejection(f"Parts moved: {distances}.", tuple(moved))
         return _Accepted(StepMotion.along((part,), direction), world.poses())
 
-    def _in_the_way(self, part: str, direction: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> tuple[str, ...]:
+    def _in_the_way(self, part: str, direction: Array) -> tuple[str, ...]:
         """The first parts that `part` runs into when it moves along `direction` until it is past everything."""
         world = self._world
-        others = [name for name in dict.fromkeys(name for name, _ in world.bodies) if name != part]
+        others = [name for name in dict.fromkeys(name for name, _ in world.there) if name != part]
         if not others:
             return ()
         mine, theirs = world.bounds(part), np.array([world.bounds(name) for name in others])

@@ -39,18 +39,7 @@ def cached_pictures(
     Put together what is asked for together: a file holds 48 jobs that follow one another (a cube in its 48
     orientations, say), and is found again only if they do.
 
-    Args:
-        jobs: pairs of an assembly (or a scene, whose colours are its own) and its seed.
-        style: as in `PictureStudio.views`.
-        colours: part name -> RGB in 0..1, for all.
-        size: height and width in pixels.
-        workers: processes that draw what is missing.
-        progress: called with (done, total).
-        folder: where the files are; None means `cache_folder`.
-        cameras: where from.
-
-    Returns:
-        uint8 (len(jobs), n_cameras, size, size, 3).
+    `folder`: where the files are; None means `cache_folder`. The others, and what is returned, as there.
     """
     look = style_named(style)
     if size < 1:

@@ -7,6 +7,7 @@ nothing collides here: bodies are visual shapes at poses.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -25,8 +26,6 @@ Progress = Callable[[int, int], None]
 Job = tuple[Assembly | Scene, int]
 #: Pictures that one process makes before it hands them back (about a quarter of a second's work).
 CHUNK = 48
-
-
 #: A rectangle before its half edges scale it, facing along z.
 _SQUARE = (np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]), np.array([[0, 1, 2], [0, 2, 3]]))
 
@@ -61,11 +60,9 @@ class PictureStudio(Closeable):
 
         Args:
             assembly: the parts, or the scene made of them (then `colours` is not asked).
-            style: ``"clean"``, ``"varied"`` or a `Style`.
+            style: ``"clean"``, ``"varied"`` or a `Style`; one that varies needs an `rng`.
             colours: part name -> RGB in 0..1; the default is `PALETTE` by the order of the parts.
             size: height and width in pixels.
-            rng: what varies a style; a style that varies needs one.
-            cameras: where from.
 
         Returns:
             uint8 (n_cameras, size, size, 3).
@@ -104,25 +101,25 @@ class PictureStudio(Closeable):
     def _arrange(self, scene: Scene, colours: Array) -> None:
         """Put bodies where the scene has them. The order in which bodies are made shows in single pixels along edges,
         so bodies are reused only by a scene of the very same shapes."""
-        p, c = self._p, self._client.id
+        p = self._p
         if scene.shapes != self._shapes:
-            p.resetSimulation(physicsClientId=c)
+            p.resetSimulation()
             made: dict[tuple[object, ...], int] = {}
             for i, shape in enumerate(scene.shapes):
                 if shape not in made:
                     made[shape] = self._visual(scene, i)
-            self._ids = [p.createMultiBody(0, -1, made[shape], [0, 0, 0], physicsClientId=c) for shape in scene.shapes]
+            self._ids = [p.createMultiBody(0, -1, made[shape], [0, 0, 0]) for shape in scene.shapes]
             self._shapes = scene.shapes
         rows = zip(self._ids, scene.position.tolist(), scene.turn.tolist(), colours[scene.owner].tolist())
         for number, position, turn, rgb in rows:
-            p.resetBasePositionAndOrientation(number, position, turn, physicsClientId=c)
-            p.changeVisualShape(number, -1, rgbaColor=[*rgb, 1.0], physicsClientId=c)
+            p.resetBasePositionAndOrientation(number, position, turn)
+            p.changeVisualShape(number, -1, rgbaColor=[*rgb, 1.0])
 
     def _visual(self, scene: Scene, i: int) -> int:
-        p, c = self._p, self._client.id
+        p = self._p
         vertices, faces = scene.meshes.get(i, _SQUARE)
         surface = flat_shaded((vertices * scene.half[i])[faces])
-        return int(p.createVisualShape(p.GEOM_MESH, **surface, physicsClientId=c))
+        return int(p.createVisualShape(p.GEOM_MESH, **surface))
 
 
 def render_views(
@@ -153,12 +150,9 @@ def render_many(
 
     Args:
         jobs: pairs of an assembly (or a scene, whose colours are its own) and its seed.
-        style: as in `PictureStudio.views`.
-        colours: part name -> RGB in 0..1, for all.
-        size: height and width in pixels.
+        style, colours, size, cameras: as in `PictureStudio.views`, for all.
         workers: processes; 1 stays in this one.
         progress: called with (done, total).
-        cameras: where from.
 
     Returns:
         uint8 (len(jobs), n_cameras, size, size, 3).
@@ -188,33 +182,14 @@ def render_chunks(
     cameras: Sequence[Camera] = VIEWS,
 ) -> Any:
     """An iterator over the pictures of each chunk, uint8 (n, n_cameras, size, size, 3), in order."""
+    draw = partial(_render_chunk, style=style, size=size, cameras=cameras)
     if workers == 1 or len(chunks) < 2:
-        return _in_this_process(chunks, style, size, cameras)
+        return map(draw, chunks)
     from joblib import Parallel, delayed
 
-    pool = Parallel(n_jobs=workers, return_as="generator")
-    return pool(delayed(_render_chunk)(chunk, style, size, cameras) for chunk in chunks)
+    return Parallel(n_jobs=workers, return_as="generator")(delayed(draw)(chunk) for chunk in chunks)
 
 
-def _in_this_process(
-    chunks: Sequence[Sequence[tuple[Scene, int]]], style: Style, size: int, cameras: Sequence[Camera]
-) -> Any:
+def _render_chunk(chunk: Sequence[tuple[Scene, int]], **options: Any) -> Pixels:
     with PictureStudio() as studio:
-        for chunk in chunks:
-            yield _draw(studio, chunk, style, size, cameras)
-
-
-def _render_chunk(chunk: Sequence[tuple[Scene, int]], style: Style, size: int, cameras: Sequence[Camera]) -> Pixels:
-    with PictureStudio() as studio:
-        return _draw(studio, chunk, style, size, cameras)
-
-
-def _draw(
-    studio: PictureStudio, chunk: Sequence[tuple[Scene, int]], style: Style, size: int, cameras: Sequence[Camera]
-) -> Pixels:
-    return np.stack(
-        [
-            studio.views(scene, style=style, size=size, rng=np.random.default_rng(seed), cameras=cameras)
-            for scene, seed in chunk
-        ]
-    )
+        return np.stack([studio.views(scene, rng=np.random.default_rng(seed), **options) for scene, seed in chunk])

@@ -16,6 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from neurosym.errors import InputError
 from neurosym.geometry.assembly import Assembly
+from neurosym.geometry.rigid_motions import posed
 from neurosym.geometry.shapes import Body, Box, Part
 from neurosym.support.arrays import Array, Numbers
 
@@ -63,10 +64,9 @@ class RigidBody:
     """What moves as one: a part, or a single piece of it.
 
     Attributes:
-        part: name of the part it belongs to.
         index: which piece of the part, 0 where a part is one body.
         solids: its convex pieces.
-        mass: mass (unit of the scene: the densest part has density one).
+        mass: in units of the scene: the densest part has density one.
         X_WC: float64 (4, 4), frame at the centre of mass along the principal axes.
         inertia: float64 (3,), principal moments in that frame.
     """
@@ -99,7 +99,6 @@ def rigid_bodies(
     """The bodies that a simulation of `assembly` moves, lengths multiplied by `scale`.
 
     Args:
-        assembly: parts in the world.
         kind: ``"parts"``: each part is one rigid compound; ``"cubes"``: each piece of it is a body of its own.
         scale: scene lengths per length unit of the assembly.
         clearance: share of its width that an upright box gives up at its sides (not at its top and bottom).
@@ -183,9 +182,7 @@ def _join(name: str, index: int, solids: Sequence[Solid], density: float) -> Rig
     else:
         moments, R = np.linalg.eigh(inertia)
         R = R * np.sign(np.linalg.det(R))
-    X_WC = np.eye(4)
-    X_WC[:3, :3], X_WC[:3, 3] = R, centre
-    return RigidBody(name, index, tuple(solids), density * volume, X_WC, density * moments)
+    return RigidBody(name, index, tuple(solids), density * volume, posed(R, centre), density * moments)
 
 
 def quaternion(R: Array) -> Array:
@@ -195,7 +192,4 @@ def quaternion(R: Array) -> Array:
 
 def matrix(position: Sequence[float] | Array, quaternion_xyzw: Sequence[float] | Array) -> Array:
     """Position and quaternion (x, y, z, w) to a pose, float64 (4, 4)."""
-    X = np.eye(4)
-    X[:3, :3] = Rotation.from_quat(quaternion_xyzw).as_matrix()
-    X[:3, 3] = position
-    return X
+    return posed(Rotation.from_quat(quaternion_xyzw).as_matrix(), position)

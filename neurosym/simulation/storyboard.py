@@ -54,11 +54,11 @@ def describe(staging: Staging, step: int) -> str:
     verb = "place" if motion.arrives else "remove"
     others = [name for name in motion.parts if name != part]
     name = part if action in motion.parts else f"{action}: {part}"
-    said = f"{verb} {name}{' with ' + _few(others) if others else ''}"
+    words = f"{verb} {name}{' with ' + _few(others) if others else ''}"
     if not motion.arrives and not around >= set(staging.there(step)):
-        said = f"take {name} off {_few(sorted(around - {part}))}"
+        words = f"take {name} off {_few(sorted(around - {part}))}"
     held = f", {_few(motion.held)} held" if motion.held else ""
-    return f"{said}, {motion.course}{held}"
+    return f"{words}, {motion.course}{held}"
 
 
 def _few(names: tuple[str, ...] | list[str]) -> str:
@@ -79,11 +79,9 @@ def best_camera(staging: Staging) -> Camera:
 
 def room_for(staging: Staging) -> Array:
     """float64 (n, 3), in the world: bounds of all parts, resting and at places along their paths."""
-    assembly, found = staging.assembly, []
-    corners = {}
-    for name, bounds in zip(assembly.names, assembly.part_bounds):
-        corners[name] = np.array(np.meshgrid(*bounds.T)).reshape(3, -1).T
-        found.append(corners[name])
+    bounds = zip(staging.assembly.names, staging.assembly.part_bounds)
+    corners = {name: np.array(np.meshgrid(*b.T)).reshape(3, -1).T for name, b in bounds}
+    found = list(corners.values())
     for motion in staging.motions:
         for share in np.linspace(0, 1, 2 * len(motion.tracks[0].poses) + 1):
             found += [corners[name] @ X[:3, :3].T + X[:3, 3] for name, X in motion.at(float(share)).items()]
