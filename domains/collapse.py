@@ -12,8 +12,6 @@ b, moved down, would hit a. Falling keeps every column's order and leaves no gap
 left decides where every cube lies.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from functools import cache
 from itertools import combinations

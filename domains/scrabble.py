@@ -5,8 +5,6 @@ Each tile is an action primitive, used at most once; a letter that is needed twi
 letters are interchangeable. Words are far shorter than the set: 3 to 6 steps of 98 actions.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections import Counter
 from collections.abc import Callable, Sequence

@@ -7,8 +7,6 @@ Sequences have 6 steps, -1 after the word's end, and groups hold what shows one 
            same for all the tiles of the step's letter.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

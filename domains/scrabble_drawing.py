@@ -9,8 +9,6 @@ Every letter is drawn once, large, on a few cuts of wood; a picture then only be
           too, on tables of any colour; light from dim to bright, tinted, falling off to one side; noise and blur.
 """
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Pictures of many words: drawn on many processes, kept on disk, and found again by what they show."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 from collections.abc import Iterable, Sequence

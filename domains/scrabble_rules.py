@@ -4,8 +4,6 @@ Tiles are laid left to right, so how many lie there says which slot is next, and
 are the N action primitives.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from neurosym.language import Action, Atom, Domain, Fluent, Type

@@ -1,7 +1,5 @@
 """Tiles in space: flat on a table, side by side in their slots, each laid from above."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

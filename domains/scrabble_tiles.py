@@ -4,8 +4,6 @@ Words are random combinations of tiles, as in Burke, Subr, Ramamoorthy (RA-L 202
 from a list that the user gives. Which word a number stands for depends on nothing but the number.
 """
 
-from __future__ import annotations
-
 import functools
 import hashlib
 from collections import Counter

@@ -4,8 +4,6 @@ Source: Burke, Subr, Ramamoorthy, "Action sequencing using visual permutations" 
 Table II. The rules of collapse are in `domains.collapse`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, ClassVar, Literal
 

@@ -3,8 +3,6 @@
 Pieces by Piet Hein; letters and the count of 240 as in Berlekamp, Conway, Guy, "Winning Ways", vol. 2.
 """
 
-from __future__ import annotations
-
 import warnings
 from functools import cache
 

@@ -6,8 +6,6 @@ and that rests stably on what is there. Which level comes next follows from how 
 make N action primitives, whatever the tower.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 

@@ -5,8 +5,6 @@
 ``full``   besides, the share of all valid orders that have each block at each step: blocks of one colour share equally.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 

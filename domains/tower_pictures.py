@@ -10,8 +10,6 @@ What stands where is geometry: the offsets drawn here are those that stability i
 ``varied``, the names that other families use, stand for easy and hard.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

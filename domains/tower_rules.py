@@ -1,7 +1,5 @@
 """The rules of building: one symbolic domain, and the derived predicates that read the reference and geometry."""
 
-from __future__ import annotations
-
 from domains.tower_blocks import Kind, ReferenceTower
 from neurosym.language import Action, Derived, Domain, Fluent, State, Type
 from neurosym.language.search_problem import Verdict

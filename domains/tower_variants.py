@@ -6,8 +6,6 @@
              (Sec. IV-C).
 """
 
-from __future__ import annotations
-
 import itertools
 from functools import cache
 

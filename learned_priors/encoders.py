@@ -4,8 +4,6 @@
 `forward` is what is learned.
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from itertools import pairwise

@@ -3,8 +3,6 @@
 Beside these there is a dense head, a perceptron (`learned_priors.networks`).
 """
 
-from __future__ import annotations
-
 import torch
 from torch import Tensor, nn
 from torch.nn import functional

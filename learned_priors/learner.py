@@ -1,7 +1,5 @@
 """What stays on the device while a network is trained, and one update of it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager

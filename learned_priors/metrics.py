@@ -1,7 +1,5 @@
 """Early figures: how well order scores match demonstrations. Whether an order holds, a planner or oracle decides."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

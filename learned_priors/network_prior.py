@@ -1,7 +1,5 @@
 """`NetworkPrior`: order scores from pictures, by a network that was trained, or that `fit` trains."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path

@@ -7,8 +7,6 @@ ROWS: a row is a distribution over actions at one step, which is what the losses
 likelihood taken after a last column normalisation is not bounded below.)
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A trained network as a model: it reads pictures, and answers with order scores or with an order."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any

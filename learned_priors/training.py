@@ -4,8 +4,6 @@ Nothing random outlives an update: the order of an epoch is drawn from (seed, ep
 (seed, update). So a checkpoint needs no state of a generator, and a run that was killed ends where it would have.
 """
 
-from __future__ import annotations
-
 import copy
 import math
 import time

@@ -4,8 +4,6 @@ These are named ``{domain}-{prior}.safetensors``, or ``{domain}-{kind}-{prior}``
 a domain's problems; their headers say the rest.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from functools import cached_property
 from pathlib import Path

@@ -3,8 +3,6 @@
 Exit codes are in `neurosym.commands.exit_codes`. Nothing heavy is imported before a command needs it.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable, Sequence
 from typing import Annotated

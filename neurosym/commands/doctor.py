@@ -1,7 +1,5 @@
 """`neurosym list` and `neurosym doctor`: what there is, whether it is ours, and whether it works."""
 
-from __future__ import annotations
-
 import importlib.util
 import platform
 import re

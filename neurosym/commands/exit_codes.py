@@ -1,7 +1,5 @@
 """What `neurosym` says to the shell: every exit code, in one table, which a test walks through the real commands."""
 
-from __future__ import annotations
-
 from neurosym.planning.result import Status
 
 #: `doctor` found something amiss, or `replay` something that moved; also what typer leaves with when the reader of a

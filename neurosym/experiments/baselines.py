@@ -3,8 +3,6 @@
 A prior that looks must beat them. They are calculated, not trained.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any

@@ -4,8 +4,6 @@ Generic over domains: a comparison names a family, numbers of its problems, plan
 kept in a journal, and a comparison that was interrupted, or is asked again with one more prior, does only the rest.
 """
 
-from __future__ import annotations
-
 import hashlib
 import zlib
 from collections.abc import Callable, Mapping, Sequence

@@ -1,7 +1,5 @@
 """What comes out of a study, in sentences that are computed from its results: none is written by hand."""
 
-from __future__ import annotations
-
 from itertools import combinations
 
 from neurosym.experiments.hypotheses import OF_OURS, OF_THE_PAPER

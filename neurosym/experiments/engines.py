@@ -4,8 +4,6 @@ A task's answer must depend on the task alone; then it is the same on every engi
 same number of threads, too: worker processes and Ray's have one, and what runs in this process has what it was given.
 """
 
-from __future__ import annotations
-
 import os
 import socket
 from collections import deque

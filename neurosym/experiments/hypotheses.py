@@ -1,7 +1,5 @@
 """What the paper says of its experiments, and what is asked of our own recipe: each is tested on the results."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Any

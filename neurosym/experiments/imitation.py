@@ -4,8 +4,6 @@ A study is a grid of trials (pictures x method x n x seed). Each trains one netw
 its own orders (`predict`) with those of pictures it never saw. Finished trials are kept in a journal.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import asdict
 from functools import cache

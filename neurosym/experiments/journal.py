@@ -1,7 +1,5 @@
 """A journal of finished work: JSON lines, each a key and a value, appended whole; a torn last line is ignored."""
 
-from __future__ import annotations
-
 import contextlib
 import hashlib
 import json

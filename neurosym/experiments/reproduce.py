@@ -3,8 +3,6 @@
 Every finished training and comparison is kept, so a run that was killed goes on where it was.
 """
 
-from __future__ import annotations
-
 import json
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence

@@ -1,7 +1,5 @@
 """One page of the results of many experiments, made from the reports and figures that their runs left behind."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from pathlib import Path

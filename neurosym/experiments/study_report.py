@@ -1,7 +1,5 @@
 """What a study leaves behind: results.csv, figures, and a page of Markdown with ours beside the paper's."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial

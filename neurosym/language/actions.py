@@ -1,7 +1,5 @@
 """Action schemas: what an action needs and what it changes, over typed parameters."""
 
-from __future__ import annotations
-
 import string
 from collections.abc import Sequence
 

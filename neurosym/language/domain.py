@@ -1,7 +1,5 @@
 """Domains: fluents and actions, checked at once, with the place of every mistake named."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 

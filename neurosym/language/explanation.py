@@ -3,8 +3,6 @@
 `explain` looks at one set of parts at which a search got stuck: nothing of it could be taken out.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any

@@ -4,8 +4,6 @@ A verdict answers for one state; a formula speaks of all states at once, so that
 programs that cannot ask geometry (`neurosym.pddl.export`). `Derived.formula` gives one; it may be None.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from neurosym.language.terms import Fluent, Literal

@@ -1,7 +1,5 @@
 """Options of functions that make problems: which there are, and a refusal, by name, of those that there are not."""
 
-from __future__ import annotations
-
 import inspect
 import json
 from collections.abc import Callable, Iterable, Mapping

@@ -6,8 +6,6 @@ planner's plan, read back by `PddlTask.order`, passes `neurosym.validate`, and w
 sequence of PDDL actions is not one to one an order, for a part that can leave in two ways has two actions.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass

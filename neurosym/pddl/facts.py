@@ -1,7 +1,5 @@
 """What a problem as STRIPS is made of: facts, and operators over them with positive conditions only."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from neurosym.language.terms import Literal

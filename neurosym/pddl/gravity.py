@@ -4,8 +4,6 @@ The falls are a finite list (`neurosym.geometry.stability.falls`). Each happens 
 and what would resist is gone; so a part of it must have left, or one that resists must still be there.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

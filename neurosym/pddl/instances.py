@@ -4,8 +4,6 @@ A way is a conjunction of facts. Ways follow from what `Derived.formula` says, o
 through all reachable states (`pddl_table`).
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Names for PDDL: any text becomes an identifier, and two texts never the same one."""
 
-from __future__ import annotations
-
 import re
 
 #: What PDDL, or a reader of it, takes for something else.

@@ -5,8 +5,6 @@ of their own, which effects keep up; disjunctions become one operator a disjunct
 falls that removals can meet (`pddl_gravity`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 from neurosym.errors import InputError

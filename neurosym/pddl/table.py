@@ -1,7 +1,5 @@
 """Conditions read off all reachable states, for predicates that have no formula."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass

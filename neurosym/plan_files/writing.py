@@ -1,7 +1,5 @@
 """What `neurosym plan --out` writes of a problem and of a result."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What `solve` refuses to be given."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

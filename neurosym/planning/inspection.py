@@ -1,7 +1,5 @@
 """What an assembly is, before any plan: parts, contacts, what is free, what is interlocked and why, if it stands."""
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass
 from typing import Any
 

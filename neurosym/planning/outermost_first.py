@@ -1,7 +1,5 @@
 """A prior that needs no training: what lies outermost leaves first."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The interface of planners: subclass `Planner`, declare `traits` truthfully, and ask through a `SearchLog`."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable

@@ -1,7 +1,5 @@
 """From a plan to a plan in space: which parts each action moves, said by the family, the motions or the effects."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from neurosym.errors import InputError, UnknownNameError

@@ -1,7 +1,5 @@
 """Independent replay of an order. Shares no code with planners or grounding, and asks geometry anew."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Names as figures write them: cut to a length, without what all of them share, and how wide they are."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 #: Longest name; what is longer is cut.

@@ -1,7 +1,5 @@
 """Lines between boxes: each as little bent as it can be without running through the boxes of others."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

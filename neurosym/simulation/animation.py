@@ -1,7 +1,5 @@
 """A plan as moving pictures, drawn by PyBullet's renderer, without a window. `film_files` writes them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 
 import numpy as np

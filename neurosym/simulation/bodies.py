@@ -1,7 +1,5 @@
 """The bodies of a world inside Bullet: made, put somewhere, taken out, asked where they are, in the scene's scale."""
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Collection, Mapping
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Words under pictures."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import lru_cache
 

@@ -6,8 +6,6 @@ passed on. A `Client` is one connection (``DIRECT``, no window and no server) th
 when it is left, when an exception passes, when it is forgotten and when Python ends.
 """
 
-from __future__ import annotations
-
 import contextlib
 import importlib
 import os

@@ -1,7 +1,5 @@
 """Collision shapes for PyBullet: boxes, and compounds of boxes and convex hulls."""
 
-from __future__ import annotations
-
 import hashlib
 from pathlib import Path
 from typing import Any

@@ -5,8 +5,6 @@ behind the last one is inside (Fuchs, Kedem and Naylor 1980). Planes that cut no
 stays whole and a joint or a frame falls into few pieces. A bowl has hundreds of them.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from neurosym.support.arrays import Array, Numbers

@@ -6,8 +6,6 @@ its pieces have 5.9, and the hollow is half filled. So a part in a snug or curve
 where the real one is not. A part that never moves needs none of this: it collides as the mesh it is.
 """
 
-from __future__ import annotations
-
 import os
 import tempfile
 from pathlib import Path

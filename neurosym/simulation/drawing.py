@@ -1,7 +1,5 @@
 """What all pictures share: flat surfaces for PyBullet's renderers, and one picture by its software renderer."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

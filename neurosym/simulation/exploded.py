@@ -1,7 +1,5 @@
 """An exploded view: the parts pulled apart so that each can be seen, along their ways out where a plan has them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Films as files: GIF, MP4, or a folder of frames, written whole or not at all."""
 
-from __future__ import annotations
-
 import importlib
 import os
 import secrets

@@ -5,8 +5,6 @@ those numbers change or the surface folds (see `neurosym.simulation.shading`), a
 which smooths it.
 """
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Collection, Mapping
 from pathlib import Path

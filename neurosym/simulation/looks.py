@@ -1,7 +1,5 @@
 """How pictures look: cameras, light, and what chance may vary."""
 
-from __future__ import annotations
-
 import colorsys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Numbers of the simulation: time steps, thresholds, friction; and where bodies lay at one moment."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import inf

@@ -4,8 +4,6 @@ Training asks for the same thousands of pictures each time. They are stored in f
 a digest of everything that decides them: geometry, colours, style, size, seeds, `RENDER_VERSION`.
 """
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path

@@ -4,8 +4,6 @@ Four views as in Burke, Subr and Ramamoorthy (2021), section V: the top and thre
 nothing collides here: bodies are visual shapes at poses.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any

@@ -13,8 +13,6 @@ mesh with a curved hollow is taken apart by V-HACD, approximately (see `neurosym
 part collides exactly as it is.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from contextlib import ExitStack
 

@@ -1,7 +1,5 @@
 """What a replay found, step by step, and in words."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """What a picture shows: an assembly as plain arrays, in the cameras' frame, with a colour for each part."""
 
-from __future__ import annotations
-
 import colorsys
 import hashlib
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,5 @@
 """What makes a drawn picture readable: dark outlines, parts set off from the others, and soft shadows on the ground."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import numpy as np

@@ -5,8 +5,6 @@ one unit more than small ones. So a `RigidBody` carries its own mass properties,
 along the principal axes, and the whole scene is scaled until a typical body measures one unit.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal

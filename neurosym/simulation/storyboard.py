@@ -1,7 +1,5 @@
 """What a film of a plan shows at each step: who is in the picture, from which side, how large, and in which words."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from neurosym.geometry.staging import Staging

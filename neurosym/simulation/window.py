@@ -4,8 +4,6 @@ So a slow screen leaves out pictures, not time, and what comes out is the same w
 the whole process when its window is closed, or when there is no OpenGL: its window has a process of its own.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import select

@@ -4,8 +4,6 @@ Lengths come and go in the assembly's unit; inside, the scene is scaled so that 
 because Bullet is less trustworthy with small bodies (5 cm cubes were judged wrongly far more often than 1 m ones).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection
 from math import sqrt
 

@@ -1,7 +1,5 @@
 """A window on a `World`: its bodies as they collide, in the colours of a plan's parts."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.spatial import ConvexHull
 

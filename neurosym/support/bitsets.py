@@ -1,7 +1,5 @@
 """Sets of small numbers as Python integers, a bit a number."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

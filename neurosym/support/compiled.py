@@ -4,8 +4,6 @@ Importing them loads no numba. It looks for changes only in the file of the func
 that call one another belong into one file.
 """
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Callable
 from typing import Any, TypeVar, cast

@@ -4,8 +4,6 @@ Work that was killed goes on where it stopped, what is damaged is made again, an
 costs speed, no more.
 """
 
-from __future__ import annotations
-
 import contextlib
 import os
 import zlib

@@ -1,7 +1,5 @@
 """How far long work is: a function that is told, and one that tells nobody."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 #: Called with (done, total).

@@ -4,8 +4,6 @@ Each is written as layers from the bottom up, side by side: rows go along +y dow
 part and a dot is nothing. Their levels are confirmed in the tests by a search over all subsets of parts.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from neurosym.errors import InputError, UnknownNameError

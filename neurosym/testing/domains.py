@@ -4,8 +4,6 @@ Tries to catch a family lying: promises that are broken, oracles that change the
 something else than planners do, training problems that turn up in the test.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Sequence
 from typing import Any

@@ -1,7 +1,5 @@
 """The conformance suite for priors: run it on one of your own, with problems of the domain it is for."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from types import SimpleNamespace
 from typing import Any, cast

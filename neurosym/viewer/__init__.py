@@ -5,8 +5,6 @@ there is to see, `planning` plans it, `exhibit` holds what is shown; `page`, `sc
 (extra `viewer`), and `export` writes a page that needs no server, whose list follows its film (`follow`).
 """
 
-from __future__ import annotations
-
 from neurosym.errors import MissingDependencyError
 
 

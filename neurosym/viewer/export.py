@@ -1,7 +1,5 @@
 """One file that plays a plan without a server and without the network."""
 
-from __future__ import annotations
-
 from html import escape
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """What geometry knows of one part: what it touches, what blocks it in each direction, what it stands on and carries."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from dataclasses import dataclass
 

@@ -4,8 +4,6 @@ The player is viser's, and says nothing to the page about it; its clock is a fie
 is found, the script does nothing: the list stays a list.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 

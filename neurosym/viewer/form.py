@@ -1,7 +1,5 @@
 """The form for planning again: what it asks, what it says, and how it reads what was typed."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Mapping
 from typing import Any, TypeVar

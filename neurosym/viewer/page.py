@@ -1,7 +1,5 @@
 """The page: the 3D view, and beside it the plan, the prior, the search, facts about a part, and planning again."""
 
-from __future__ import annotations
-
 import contextlib
 import logging
 import threading

@@ -1,7 +1,5 @@
 """Planning in a thread, which can be watched and stopped."""
 
-from __future__ import annotations
-
 import logging
 import threading
 import time

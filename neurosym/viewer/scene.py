@@ -1,7 +1,5 @@
 """The 3D view: a timeline's parts as nodes of a viser scene, moved by time."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable, Collection, Mapping
 

@@ -1,7 +1,5 @@
 """A prior's order scores as a table, steps by actions, in HTML."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from html import escape
 

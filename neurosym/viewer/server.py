@@ -1,7 +1,5 @@
 """The local server: viser, quiet, on loopback, for its own page alone, without the tunnel that shares a page."""
 
-from __future__ import annotations
-
 import contextlib
 import functools
 import io

@@ -1,7 +1,5 @@
 """Parts as triangles and outlines to draw, in the world, at rest in the work."""
 
-from __future__ import annotations
-
 from collections import Counter
 from dataclasses import dataclass
 

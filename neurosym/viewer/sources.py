@@ -1,7 +1,5 @@
 """What `neurosym view` is pointed at: a problem family, the file of a plan, or a user's own assembly."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial, wraps

@@ -5,8 +5,6 @@ rows in the order of the plan; a group that leaves together is set down as one, 
 it there. A plan that puts together is the film of its reverse, run backwards.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import cached_property
 

@@ -1,7 +1,5 @@
 """The Franka Panda that ships with PyBullet: its joints, its hand, and inverse kinematics. Lengths are metres."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -5,8 +5,6 @@ a perfect camera would tell; every grasp starts from where the block really lies
 sits in the hand.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 

@@ -3,8 +3,6 @@
 Everything is at its true size in metres, at 1/240 s a step. The table is the plane z = 0, the arm stands at the origin.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from typing import Any

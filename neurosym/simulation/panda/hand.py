@@ -3,8 +3,6 @@
 Each motion is thought through in a second cell first, where asking whether something is touched changes nothing.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """How the arm is to work, and what came of it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 

@@ -1,7 +1,5 @@
 """Watching the arm at work: in a window, or as a film."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from neurosym.simulation.drawing import drawn
