@@ -13,9 +13,11 @@ left decides where every cube lies.
 """
 
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, reduce
 from itertools import combinations
+from operator import or_
 
+import networkx as nx
 import numpy as np
 
 from neurosym.errors import AssemblyError
@@ -58,13 +60,9 @@ class Stacks:
 
     def cubes_of(self, pieces: int) -> int:
         """All cubes of the pieces in a bitset; each set is gathered once."""
-        cubes = self._cubes.get(pieces)
-        if cubes is None:
-            cubes = 0
-            for piece in bits(pieces):
-                cubes |= self.own[piece]
-            self._cubes[pieces] = cubes
-        return cubes
+        if pieces not in self._cubes:
+            self._cubes[pieces] = reduce(or_, (self.own[piece] for piece in bits(pieces)), 0)
+        return self._cubes[pieces]
 
 
 def stacks_of(world: AssemblyGeometry) -> Stacks:
@@ -190,25 +188,17 @@ def check_standing(geometry: AssemblyGeometry, rule: str) -> None:
                 )
         return
     # Whoever stands on the table, then whoever stands on those, and so on.
-    carriers: dict[int, set[int]] = {}
+    carries = nx.DiGraph()
+    carries.add_node(TABLE)
     for contact in geometry.contacts:
         a, b = int(world.owners[contact.a]), TABLE if contact.b == TABLE else int(world.owners[contact.b])
-        if contact.normal[2] < -0.7:
-            carriers.setdefault(b, set()).add(a)
-        elif contact.normal[2] > 0.7:
-            carriers.setdefault(a, set()).add(b)
-    held, waiting = {TABLE}, [TABLE]
-    while waiting:
-        for carried in carriers.get(waiting.pop(), set()) - held:
-            if present >> carried & 1:
-                held.add(carried)
-                waiting.append(carried)
-    for number in bits(present):
-        if number not in held:
-            raise AssemblyError(
-                f"Piece {world.names[number]!r} is floating: nothing that it stands on reaches the table (z is up, the "
-                f"table is at z = {world.ground:g}). Move it down, or leave it out."
-            )
+        if abs(contact.normal[2]) > 0.7:
+            carries.add_edge(*((b, a) if contact.normal[2] < 0 else (a, b)))
+    if floating := set(range(len(geometry))) - nx.descendants(carries, TABLE):
+        raise AssemblyError(
+            f"Piece {world.names[min(floating)]!r} is floating: nothing that it stands on reaches the table (z is up, "
+            f"the table is at z = {world.ground:g}). Move it down, or leave it out."
+        )
     if rule == "rigid":
         standing = geometry.stability.standing(present)
         if not standing.stands:

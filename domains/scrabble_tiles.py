@@ -13,20 +13,15 @@ import numpy as np
 
 from neurosym.errors import InputError
 
-#: How often each letter comes in the standard English set, the two blanks left out.
-_COUNTS = {
-    letter: count
-    for count, letters in {1: "jkqxz", 2: "bcfhmpvwy", 3: "g", 4: "dlsu", 6: "nrt", 8: "o", 9: "ai", 12: "e"}.items()
-    for letter in letters
-}
-COUNTS = dict(sorted(_COUNTS.items()))
 
+def _each(letters_of: dict[int, str]) -> dict[str, int]:
+    return dict(sorted((letter, number) for number, letters in letters_of.items() for letter in letters))
+
+
+#: How often each letter comes in the standard English set, the two blanks left out.
+COUNTS = _each({1: "jkqxz", 2: "bcfhmpvwy", 3: "g", 4: "dlsu", 6: "nrt", 8: "o", 9: "ai", 12: "e"})
 #: What a tile is worth; printed on it.
-VALUES = {
-    letter: value
-    for value, letters in {1: "aeilnorstu", 2: "dg", 3: "bcmp", 4: "fhvwy", 5: "k", 8: "jx", 10: "qz"}.items()
-    for letter in letters
-}
+VALUES = _each({1: "aeilnorstu", 2: "dg", 3: "bcmp", 4: "fhvwy", 5: "k", 8: "jx", 10: "qz"})
 
 #: Tiles in a word.
 SHORTEST, LONGEST = 3, 6

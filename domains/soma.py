@@ -27,11 +27,8 @@ _p = piece("p")
 
 
 def _take_apart(rule: str) -> Domain:
-    geometry = (
-        [predicates.free(present)(_p), predicates.stable_without(present)(_p)]
-        if rule == "rigid"
-        else [keeps_standing(present, rule)(_p)]
-    )
+    asked = [predicates.free(present), predicates.stable_without(present)]
+    geometry = [predicate(_p) for predicate in (asked if rule == "rigid" else [keeps_standing(present, rule)])]
     remove = Action("remove", _p, pre=[present(_p), *geometry], eff=[~present(_p)], label="{p}")
     return Domain(f"soma-{rule}", fluents=[present], actions=[remove])
 
@@ -55,20 +52,13 @@ class SomaFamily(ProblemFamily):
     name = "soma"
     reference = "Burke, Subr, Ramamoorthy (RA-L 2021), Sec. IV-D, Table II; Berlekamp, Conway, Guy, Winning Ways"
     domain = DOMAINS["cubes"]
-    published: ClassVar[Sequence[Mapping[str, Any]]] = (
-        {"planner": "swap-repair", "prior": "random", "initial_failures": None, "iterations": (5.35, 4.12)},
-        {
-            "planner": "swap-repair",
-            "prior": "tcn-paper",
-            "initial_failures": (54.95, 10.99),
-            "iterations": (1.90, 3.25),
-        },
-        {
-            "planner": "swap-repair",
-            "prior": "sinkhorn-paper",
-            "initial_failures": (51.55, 6.19),
-            "iterations": (1.75, 3.19),
-        },
+    published: ClassVar[Sequence[Mapping[str, Any]]] = tuple(
+        {"planner": "swap-repair", "prior": prior, "initial_failures": failures, "iterations": iterations}
+        for prior, failures, iterations in (
+            ("random", None, (5.35, 4.12)),
+            ("tcn-paper", (54.95, 10.99), (1.90, 3.25)),
+            ("sinkhorn-paper", (51.55, 6.19), (1.75, 3.19)),
+        )
     )
     #: Rules of collapse, for the command line.
     collapses = RULES
@@ -195,13 +185,11 @@ class SomaFamily(ProblemFamily):
         """The cubes of a part, with the options of `problem`."""
         return [self.problem(n, **options) for n in self.numbers(part, split=split)]
 
-    def observe(self, problem: Problem) -> Pixels:
-        rng = np.random.default_rng(problem.details["seed"])
-        return render_views(problem.world, problem.details["pictures"], rng)
-
     def pictures(self, problem: Problem, *, style: str = "clean", rng: np.random.Generator | None = None) -> Pixels:
         """Four views, top and three sides: uint8 (4, 64, 64, 3)."""
-        return render_views(problem.world, style, rng or np.random.default_rng(0))
+        from neurosym.simulation.render import render_views  # loads PyBullet
+
+        return render_views(problem.world, style=style, rng=rng or np.random.default_rng(0))
 
     def take_pictures(
         self, problems: Sequence[Problem], *, style: str, workers: int = 1, progress: Progress | None = None
@@ -241,24 +229,14 @@ class SomaFamily(ProblemFamily):
         return sum(counts), min(counts), max(counts)
 
 
-def render_views(assembly: Assembly, style: str, rng: np.random.Generator) -> Pixels:
-    """Top and three sides, uint8 (4, 64, 64, 3)."""
-    from neurosym.simulation import render  # loads PyBullet
-
-    views: Pixels = render.render_views(assembly, style=style, rng=rng)
-    return views
-
-
 def _check_connected(name: str, cells: Sequence[tuple[int, ...]]) -> None:
     left = {tuple(map(int, c)) for c in cells}
     reached = [left.pop()]
     while reached:
         x, y, z = reached.pop()
         steps = ((x + 1, y, z), (x - 1, y, z), (x, y + 1, z), (x, y - 1, z), (x, y, z + 1), (x, y, z - 1))
-        for neighbour in steps:
-            if neighbour in left:
-                left.remove(neighbour)
-                reached.append(neighbour)
+        reached += left.intersection(steps)
+        left.difference_update(steps)
     if left:
         raise AssemblyError(
             f"Piece {name!r}: expected cells that hang together face to face; {sorted(left)} are apart from the rest. "

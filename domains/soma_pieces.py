@@ -77,19 +77,17 @@ def _covers() -> NDArray[np.int8]:
             rows.append(row)
             owner.append(number)
     matrix = np.array(rows)
-    found = []
     with warnings.catch_warnings():
         # Of numba, when it first compiles xcover, about a hash in there; it is not the user's business.
         warnings.filterwarnings("ignore", message="unsafe cast from uint64")
         from xcover import covers_bool
 
         covers = list(covers_bool(matrix))
-    for cover in covers:
-        filled = np.zeros(27, dtype=np.int8)
+    filled = np.zeros((len(covers), 27), dtype=np.int8)
+    for cube, cover in zip(filled, covers):
         for row_number in cover:
-            filled[matrix[row_number, :27]] = owner[row_number]
-        found.append(filled)
-    return np.array(found)
+            cube[matrix[row_number, :27]] = owner[row_number]
+    return filled
 
 
 #: Where the T lies in every listed solution: flat at the bottom, its bar along an edge.

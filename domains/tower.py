@@ -136,9 +136,6 @@ class TowerFamily(ProblemFamily):
         numbers = self.numbers(part, split=split, variant=variant, by=by)
         return [self.problem(n, variant=variant, **options) for n in numbers]
 
-    def observe(self, problem: Problem) -> Pixels:
-        return take_picture(problem.world, problem.details["pictures"], np.random.default_rng(problem.details["seed"]))
-
     def staging(self, problem: Problem, plan: Sequence[str], motions: Sequence[StepMotion | None]) -> Staging:
         tower = problem.world
         standing = tuple(str(atom.args[0]) for atom in problem.init if atom.predicate == rules.placed)

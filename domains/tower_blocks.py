@@ -34,14 +34,8 @@ COLOURS: Mapping[str, tuple[float, float, float]] = {
 class Block:
     """A block: a box that can be placed once.
 
-    Attributes:
-        name: of the block, and of the action primitive that places it.
-        colour: one of `COLOURS`.
-        size: width (x), depth (y) and height (z), in any unit of length.
-
-    Raises:
-        UnknownNameError: no such colour.
-        AssemblyError: a size that is not three lengths above 0.
+    Its name is that of the action primitive that places it, its colour one of `COLOURS`, its size width (x), depth (y)
+    and height (z), in any unit. Raises UnknownNameError: no such colour; AssemblyError: not three lengths above 0.
     """
 
     name: str
@@ -153,15 +147,10 @@ class ReferenceTower:
         """
         if not 0 < len(order) <= len(self.levels):
             raise AssemblyError(f"Expected 1 to {len(self.levels)} blocks; got {len(order)}.")
-        parts, top = [], 0.0
-        for name, (x, y) in zip(order, self.offsets.tolist()):
+        for name in order:
             if name not in self.kinds:
                 raise UnknownNameError("block", name, self.names)
-            size = self.kinds[name][1]
-            at = shifted((x, y, top + size[2] / 2))
-            parts.append(boxes_part(name, np.zeros((1, 3)), np.array(size), at))
-            top += size[2]
-        return Assembly(tuple(parts), table=0.0)
+        return _stacked(order, [self.kinds[name][1] for name in order], self.offsets.tolist())
 
     def anew(self) -> ReferenceTower:
         """The same tower with nothing remembered: every question is asked anew."""
@@ -170,9 +159,13 @@ class ReferenceTower:
 
 @lru_cache(maxsize=4096)
 def _stack(sizes: tuple[tuple[float, float, float], ...], offsets: tuple[tuple[float, float], ...]) -> AssemblyGeometry:
+    return AssemblyGeometry(_stacked([f"level {i}" for i in range(1, len(sizes) + 1)], sizes, offsets))
+
+
+def _stacked(names: Sequence[str], sizes: Sequence[Sequence[float]], offsets: Sequence[Sequence[float]]) -> Assembly:
     parts, top = [], 0.0
-    for i, (size, (x, y)) in enumerate(zip(sizes, offsets), 1):
+    for name, size, (x, y) in zip(names, sizes, offsets):
         at = shifted((x, y, top + size[2] / 2))
-        parts.append(boxes_part(f"level {i}", np.zeros((1, 3)), np.array(size), at))
+        parts.append(boxes_part(name, np.zeros((1, 3)), np.array(size), at))
         top += size[2]
-    return AssemblyGeometry(Assembly(tuple(parts), table=0.0))
+    return Assembly(tuple(parts), table=0.0)

@@ -68,8 +68,7 @@ def demonstrate(
 def shares(variant: str, colours: Sequence[str]) -> NDArray[np.float32]:
     """The share of all valid orders of a colour sequence with each block at each step, float32 (n_levels, n_blocks)."""
     own = np.array([[b.colour == colour for b in blocks_of(variant)] for colour in colours], dtype=np.float32)
-    found: NDArray[np.float32] = own / own.sum(axis=1, keepdims=True)
-    return found
+    return np.asarray(own / own.sum(axis=1, keepdims=True))
 
 
 def _chance_order(variant: str, colours: Sequence[str], rng: np.random.Generator) -> list[int]:

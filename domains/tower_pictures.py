@@ -19,7 +19,7 @@ from domains.tower_blocks import COLOURS, ReferenceTower
 from neurosym.errors import UnknownNameError
 from neurosym.language.problem_family import Progress
 from neurosym.simulation.looks import Camera, Style
-from neurosym.simulation.scene import Scene
+from neurosym.simulation.scene import Scene, scene_of
 from neurosym.support.arrays import Array, Pixels
 
 #: Other families' names for the settings.
@@ -41,16 +41,36 @@ class Untidiness:
     jitter: float = 0.0
 
 
+#: The one camera: from the side (+x), raised a little.
+CAMERAS = (Camera(0, 12, distance=6.6),)
+#: What chance may vary in a setting besides the tower itself.
+LOOKS = {
+    "easy": Style(),
+    "hard": Style(
+        light_azimuth=(-90.0, 90.0),
+        light_elevation=(20.0, 80.0),
+        ambient=(0.35, 0.65),
+        diffuse=(0.25, 0.6),
+        specular=(0.0, 0.3),
+        shadow=0.25,
+        azimuth=8.0,
+        elevation=5.0,
+        distance=0.08,
+        hue=0.05,
+        brightness=0.3,
+        noise=(5.0, 25.0),
+    ),
+}
 #: The upper levels' centre of mass lies at most 3 leans and 2 jitters off the lowest block's middle: 0.39 of its edge.
 SETTINGS = {"easy": Untidiness(), "hard": Untidiness(shift=0.4, lean=0.05, jitter=0.12)}
 
 
 def setting_named(name: str) -> str:
     """The setting that a name or an alias stands for. Raises UnknownNameError: no such setting."""
-    found = ALIASES.get(name, name)
-    if found not in SETTINGS:
+    setting = ALIASES.get(name, name)
+    if setting not in SETTINGS:
         raise UnknownNameError("style of pictures", name, (*SETTINGS, *ALIASES))
-    return found
+    return setting
 
 
 def picture_seed(seed: int, variant: str, number: int) -> int:
@@ -85,7 +105,7 @@ def take_pictures(
     from neurosym.simulation.picture_cache import cached_pictures
 
     jobs = [(_scene(tower), seed) for tower, seed in zip(towers, seeds, strict=True)]
-    return cached_pictures(jobs, style=look(style), workers=workers, progress=progress, cameras=cameras())
+    return cached_pictures(jobs, style=LOOKS[setting_named(style)], workers=workers, progress=progress, cameras=CAMERAS)
 
 
 def take_picture(tower: ReferenceTower, style: str, rng: np.random.Generator) -> Pixels:
@@ -93,41 +113,10 @@ def take_picture(tower: ReferenceTower, style: str, rng: np.random.Generator) ->
     from neurosym.simulation.render import PictureStudio  # loads PyBullet
 
     with PictureStudio() as studio:
-        return studio.views(_scene(tower), style=look(style), rng=rng, cameras=cameras())
-
-
-def cameras() -> tuple[Camera, ...]:
-    """The one camera: from the side (+x), raised a little."""
-    from neurosym.simulation.looks import Camera
-
-    return (Camera(0, 12, distance=6.6),)
-
-
-def look(style: str) -> Style:
-    """What chance may vary in a setting besides the tower itself."""
-    from neurosym.simulation.looks import Style
-
-    if setting_named(style) == "easy":
-        return Style()
-    return Style(
-        light_azimuth=(-90.0, 90.0),
-        light_elevation=(20.0, 80.0),
-        ambient=(0.35, 0.65),
-        diffuse=(0.25, 0.6),
-        specular=(0.0, 0.3),
-        shadow=0.25,
-        azimuth=8.0,
-        elevation=5.0,
-        distance=0.08,
-        hue=0.05,
-        brightness=0.3,
-        noise=(5.0, 25.0),
-    )
+        return studio.views(_scene(tower), style=LOOKS[setting_named(style)], rng=rng, cameras=CAMERAS)
 
 
 def _scene(tower: ReferenceTower) -> Scene:
-    from neurosym.simulation.scene import scene_of
-
     colours = {name: COLOURS[colour] for name, colour in zip(tower.assembly.names, tower.colours)}
     height = tower.frame or float(tower.assembly.bounds[1, 2])
     # The camera stays where it is: a low tower looks low.

@@ -56,9 +56,9 @@ def _rests(world: ReferenceTower, state: State, b: str) -> Verdict:
         return Verdict(True)
     names = (*_built(world, state), b)
     because = tuple(names[i] for i in falling)
-    said = f"With {b} on level {height + 1} the tower topples: {', '.join(because)} would fall."
+    reason = f"With {b} on level {height + 1} the tower topples: {', '.join(because)} would fall."
     # No other kind of block may come next, and any of this kind topples it: this is for good.
-    return Verdict(False, because, said, ())
+    return Verdict(False, because, reason, ())
 
 
 def _finished(world: ReferenceTower, state: State) -> Verdict:
@@ -80,10 +80,9 @@ def _left(world: ReferenceTower, state: State) -> list[str]:
 def _built(world: ReferenceTower, state: State) -> list[str]:
     """The blocks that are placed, level by level; of blocks of one kind it does not matter which is where."""
     there = [n for n in world.names if state.holds(placed(n))]
-    built = []
+    built: list[str] = []
     for kind in world.reference[: len(there)]:
-        name = next(n for n in there if world.kinds[n] == kind and n not in built)
-        built.append(name)
+        built.append(next(n for n in there if world.kinds[n] == kind and n not in built))
     return built
 
 

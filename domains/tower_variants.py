@@ -47,8 +47,8 @@ def towers(variant: str) -> tuple[tuple[int, ...], ...]:
 @cache
 def sequences(variant: str) -> tuple[tuple[str, ...], ...]:
     """The different colour sequences, from the bottom up, the lower towers first."""
-    found = {colours_of(variant, number) for number in range(len(towers(variant)))}
-    return tuple(sorted(found, key=lambda colours: (len(colours), colours)))
+    different = {colours_of(variant, number) for number in range(len(towers(variant)))}
+    return tuple(sorted(different, key=lambda colours: (len(colours), colours)))
 
 
 @cache
@@ -87,8 +87,7 @@ def split_numbers(variant: str, part: str, split: int, by: str) -> tuple[int, ..
     to_train = _trains(variant, split, by)
     rng = np.random.default_rng([_ORDER_STREAM, VARIANTS.index(variant), DIVIDED.index(by), split])
     order = rng.permutation(total)
-    chosen = order[to_train[order] == (part == "train")]
-    return tuple(int(n) for n in chosen)
+    return tuple(order[to_train[order] == (part == "train")].tolist())
 
 
 @cache
@@ -110,5 +109,4 @@ def _trains(variant: str, split: int, by: str) -> Truths:
         free = np.unique(ids[~tall])
     rng = np.random.default_rng([_SPLIT_STREAM, VARIANTS.index(variant), DIVIDED.index(by), split])
     divided[rng.permutation(free)[: round(TRAIN_SHARE * len(free))]] = True
-    found: Truths = divided[ids]
-    return found
+    return np.asarray(divided[ids])

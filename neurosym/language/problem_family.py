@@ -22,8 +22,6 @@ class ProblemFamily(Semantics, ABC):
     """What an entry point in ``neurosym.domains`` names.
 
     Attributes:
-        name: the name it is registered under.
-        domain: the symbols.
         reference: where the task and its numbers come from.
         published: rows of published figures, shown beside ours by `compare`.
     """
@@ -49,18 +47,25 @@ class ProblemFamily(Semantics, ABC):
         """Pictures of the finished work, uint8 (V, H, W, 3)."""
         raise NotImplementedError(f"the domain {self.name!r} has no pictures")
 
+    def observe(self, problem: Problem) -> Pixels | None:
+        """The pictures that a problem's details ask for, by their style and seed; None where they ask for none."""
+        details = problem.details
+        if not {"pictures", "seed"} <= set(details):
+            return None
+        return self.pictures(problem, style=details["pictures"], rng=np.random.default_rng(details["seed"]))
+
     def observed(
         self, problems: Sequence[Problem], *, workers: int = 1, progress: Progress | None = None
     ) -> list[Problem]:
         """The same problems with their pictures taken, all of a style in one go (`take_pictures`)."""
-        found = list(problems)
+        seen = list(problems)
         for style in sorted({str(p.details.get("pictures")) for p in problems}):
             chosen = [i for i, p in enumerate(problems) if str(p.details.get("pictures")) == style]
             own = [problems[i] for i in chosen]
             views = self.take_pictures(own, style=style, workers=workers, progress=progress)
             for i, view in zip(chosen, () if views is None else views):
-                found[i] = problems[i].with_pictures(view)
-        return found
+                seen[i] = problems[i].with_pictures(view)
+        return seen
 
     def take_pictures(
         self, problems: Sequence[Problem], *, style: str, workers: int = 1, progress: Progress | None = None
