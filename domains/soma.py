@@ -195,7 +195,7 @@ class SomaFamily(ProblemFamily):
         self, problems: Sequence[Problem], *, style: str, workers: int = 1, progress: Progress | None = None
     ) -> Pixels:
         """Pictures of many problems, from disk where they were taken before."""
-        from neurosym.simulation.picture_cache import cached_pictures
+        from neurosym.simulation.render import cached_pictures
 
         jobs = [(p.world, p.details["seed"]) for p in problems]
         return cached_pictures(jobs, style=style, workers=workers, progress=progress)

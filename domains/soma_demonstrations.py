@@ -60,7 +60,7 @@ def demonstrate(
     progress: Progress | None = None,
 ) -> Demonstrations:
     """Demonstrations for the cubes of these numbers; pictures and labels come from disk where they were made before."""
-    from neurosym.simulation.picture_cache import cached_pictures
+    from neurosym.simulation.render import cached_pictures
 
     if recipe not in RECIPES:
         raise UnknownNameError("recipe", recipe, RECIPES)

@@ -102,7 +102,7 @@ def take_pictures(
     progress: Progress | None = None,
 ) -> Pixels:
     """One picture a tower, uint8 (n, 1, 64, 64, 3), from disk where it was taken before."""
-    from neurosym.simulation.picture_cache import cached_pictures
+    from neurosym.simulation.render import cached_pictures
 
     jobs = [(_scene(tower), seed) for tower, seed in zip(towers, seeds, strict=True)]
     return cached_pictures(jobs, style=LOOKS[setting_named(style)], workers=workers, progress=progress, cameras=CAMERAS)

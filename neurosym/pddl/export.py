@@ -14,7 +14,7 @@ from pathlib import Path
 from neurosym.errors import InputError, UnknownNameError
 from neurosym.language.problem import Problem
 from neurosym.language.terms import Type
-from neurosym.pddl.names import Names
+from neurosym.pddl.facts import Names
 from neurosym.pddl.strips import Fact, Mark, Strips, strips
 from neurosym.support.files import write_text
 

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from neurosym.plotting.labels import shortened
-from neurosym.plotting.style import COLOURS, COLUMN, LOOKS, SMALL, TITLE, add_legend, mark, papers_mark, tidy
+from neurosym.plotting.style import COLOURS, COLUMN, LOOKS, SMALL, TITLE, add_legend, mark, papers_mark, shortened, tidy
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 
 import networkx as nx
 
-from neurosym.plotting.labels import shortened
-from neurosym.plotting.style import COLUMN
+from neurosym.plotting.style import COLUMN, shortened
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -9,8 +9,7 @@ import networkx as nx
 import numpy as np
 
 from neurosym.geometry.step_motion import GROUND
-from neurosym.plotting.labels import shortened
-from neurosym.plotting.style import COLUMN, SMALL, TITLE, tidy
+from neurosym.plotting.style import COLUMN, SMALL, TITLE, shortened, tidy
 from neurosym.support.arrays import Array
 
 if TYPE_CHECKING:

@@ -9,8 +9,7 @@ import numpy as np
 
 from neurosym.planning.order_scores import OrderScores
 from neurosym.plotting.errors import write_shares
-from neurosym.plotting.labels import shortened, without_common
-from neurosym.plotting.style import COLOURS, COLUMN, SMALL, TITLE, add_legend, mark, tidy
+from neurosym.plotting.style import COLOURS, COLUMN, SMALL, TITLE, add_legend, mark, shortened, tidy, without_common
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -7,8 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from neurosym.planning.result import PlanResult
-from neurosym.plotting.labels import shortened, width_of, without_common
-from neurosym.plotting.style import COLOURS, COLUMN, TITLE, add_legend, mark, tidy
+from neurosym.plotting.style import COLOURS, COLUMN, TITLE, add_legend, mark, shortened, tidy, width_of, without_common
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

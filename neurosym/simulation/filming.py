@@ -1,7 +1,7 @@
 """A camera on a plan: parts at any poses, on a ground that takes their shadows, with dark outlines. No window needed.
 
 PyBullet's software renderer draws at twice the size with a number for each pixel's part; outlines come from where
-those numbers change or the surface folds (see `neurosym.simulation.shading`), and the picture is then made smaller,
+those numbers change or the surface folds (see `neurosym.simulation.drawing`), and the picture is then made smaller,
 which smooths it.
 """
 
@@ -16,10 +16,9 @@ from numpy.typing import NDArray
 from neurosym.errors import InputError
 from neurosym.geometry.assembly import Assembly
 from neurosym.simulation.client import Client, Closeable
-from neurosym.simulation.drawing import drawn, flat_shaded
+from neurosym.simulation.drawing import LIGHT, Single, cast, drawn, flat_shaded, ink, set_off
 from neurosym.simulation.looks import Camera, aimed
 from neurosym.simulation.scene import RGB
-from neurosym.simulation.shading import LIGHT, Single, cast, ink, set_off
 from neurosym.simulation.solids import quaternion
 from neurosym.support.arrays import Array, Pixels
 

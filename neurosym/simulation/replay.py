@@ -27,8 +27,8 @@ from neurosym.simulation.oracle import COLLAPSE_CUBES, CUBES_CLEARANCE
 from neurosym.simulation.physics import MOVED_SHARE, SETTLE_STEPS, Physics, Snapshot
 from neurosym.simulation.replay_report import ReplayReport, StepReplay, in_hand, reason_of
 from neurosym.simulation.solids import BodiesKind
+from neurosym.simulation.window import WorldWindow
 from neurosym.simulation.world import World
-from neurosym.simulation.world_window import WorldWindow
 
 #: A pulled part that ends farther than this from its path's end, in typical bodies, was jammed.
 JAMMED_SHARE = 0.5

@@ -2,7 +2,7 @@
 
 `timeline`, `facts`, `solids`, `panels`, `steps` and `score_table` are pure: they know no server. `sources` opens what
 there is to see, `planning` plans it, `exhibit` holds what is shown; `page`, `scene` and `form` show it with viser
-(extra `viewer`), and `export` writes a page that needs no server, whose list follows its film (`follow`).
+(extra `viewer`), and `export` writes a page that needs no server, whose list keeps up with its film.
 """
 
 from neurosym.errors import MissingDependencyError

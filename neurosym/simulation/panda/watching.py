@@ -2,11 +2,10 @@
 
 import numpy as np
 
-from neurosym.simulation.drawing import drawn
+from neurosym.simulation.drawing import LIGHT, drawn
 from neurosym.simulation.film_files import RATE
 from neurosym.simulation.looks import Camera, aimed
 from neurosym.simulation.panda.cell import TIME_STEP, Cell
-from neurosym.simulation.shading import LIGHT
 from neurosym.simulation.window import Shown, Spectator, Window
 from neurosym.support.arrays import Array, Pixels
 
