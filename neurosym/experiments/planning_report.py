@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from neurosym import __version__
+from neurosym import __version__, plotting
 from neurosym.experiments.benchmark import Outcome
 from neurosym.experiments.reporting import (
     Drawn,
@@ -23,7 +23,6 @@ from neurosym.experiments.reporting import (
     values_by,
     write_experiment,
 )
-from neurosym.plotting import Panel, points_figure
 from neurosym.registry import load_domain
 
 if TYPE_CHECKING:
@@ -73,14 +72,14 @@ def methods_figure(experiment: Experiment, records: pd.DataFrame, style: str) ->
         return {row: [scale * v for v in known.get((style, row, metric), ())] for row in rows}
 
     failures = {m: own["initial_failures"] for m, own in paper.items() if own.get("initial_failures")}
-    panels = [Panel("initial\nfailures (%)", values("initial_failures", 100), failures, (0, 100))]
+    panels = [plotting.Panel("initial\nfailures (%)", values("initial_failures", 100), failures, (0, 100))]
     for planner in experiment.planners:
         # The paper's deviation is over problems, ours over splits: beside each other they would mislead.
         means = {m: (own["iterations"][0], 0.0) for m, own in paper.items()} if planner == PAPERS_PLANNER else {}
-        panels.append(Panel(f"iterations:\n{planner}", values(f"iterations {planner}"), means, None))
+        panels.append(plotting.Panel(f"iterations:\n{planner}", values(f"iterations {planner}"), means, None))
     tested = records.loc[records["pictures"] == style, "n"].max()
     title = f"{experiment.domain}, {style} pictures\n{tested} test problems a split, {_splits(experiment)}"
-    return points_figure(title, rows, panels, each="one split")
+    return plotting.points_figure(title, rows, panels, each="one split")
 
 
 def report(experiment: Experiment, records: pd.DataFrame, drawn: Sequence[Drawn] = ()) -> str:

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
+from neurosym import plotting
 from neurosym.experiments.benchmark import NO_PRIOR, Outcome
-from neurosym.plotting import iterations_figure, save_both
 from neurosym.registry import load_domain
 from neurosym.support.files import write_text
 
@@ -91,7 +91,9 @@ def figure_of(outcome: Outcome) -> Figure:
     what = [comparison.domain, str(comparison.options.get("collapse") or ""), comparison.oracle]
     n = f"{len(comparison.numbers)} problems" + (f" × {comparison.seeds} seeds" if comparison.seeds > 1 else "")
     title = f"{', '.join(filter(None, what))}: n = {n}"
-    return iterations_figure(title, counts, paper={cell: figures[0] for cell, figures in papers.items() if figures})
+    return plotting.iterations_figure(
+        title, counts, paper={cell: figures[0] for cell, figures in papers.items() if figures}
+    )
 
 
 def table(given: Sequence[Row]) -> Table:
@@ -155,9 +157,6 @@ def write_csv(given: Sequence[Row], path: str | Path) -> Path:
     return Path(path)
 
 
-# -- what all reports share -----------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True)
 class Drawn:
     """A figure: the name of its files without ending, what it shows, and whether the report shows it or only links."""
@@ -186,7 +185,7 @@ def write_experiment(
     write_text(out / "results.csv", records.to_csv(index=False, lineterminator="\n"))
     figures = []
     for each in drawn:
-        save_both(each.figure, out / each.name)
+        plotting.save_both(each.figure, out / each.name)
         figures.append(each)
     write_text(out / "report.md", page(figures))
 

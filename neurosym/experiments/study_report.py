@@ -10,7 +10,6 @@ from neurosym import __version__, plotting
 from neurosym.experiments.conclusions import conclusions
 from neurosym.experiments.reporting import Drawn, markdown_table, provenance, spread, write_experiment
 from neurosym.experiments.studies import Results
-from neurosym.plotting import Curves, Panel, Spread
 
 #: Classes above which each method's confusion matrix is a figure of its own.
 LARGE = 10
@@ -111,7 +110,7 @@ class _Figures:
         panels = []
         for metric, title in metrics.items():
             paper = {m: (own[metric], own.get(f"{metric}_std", 0.0)) for m, own in published if metric in own}
-            panels.append(Panel(title, {row: self._values(row, metric) for row in self.study.rows}, paper))
+            panels.append(plotting.Panel(title, {row: self._values(row, metric) for row in self.study.rows}, paper))
         figure = plotting.points_figure(self.title, self.study.rows, panels)
         yield Drawn(f"shares-{self.style}", "Shares of test sequences, and of their steps, a row a method", figure)
 
@@ -127,13 +126,13 @@ class _Figures:
         if self.results.lengths_vary:
             metrics["stop_accuracy"] = "length right"
         panels = [
-            Curves(title, {row: {n: self._values(row, metric, n) for n in study.sizes} for row in study.rows})
+            plotting.Curves(title, {row: {n: self._values(row, metric, n) for n in study.sizes} for row in study.rows})
             for metric, title in metrics.items()
         ]
         spread = None
         if study.ours in study.methods:
             right = {n: self.results.counts[self.style, study.ours, n].right for n in study.sizes}
-            spread = Spread(study.ours, right)
+            spread = plotting.Spread(study.ours, right)
         # Sizes that double want a logarithmic axis.
         log = len(study.sizes) > 2 and what == "demonstrations"
         figure = plotting.curves_figure(_title(self.results, self.style), what, panels, spread=spread, log=log)

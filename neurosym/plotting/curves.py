@@ -1,19 +1,15 @@
 """Curves over the number of demonstrations or actions, as the paper's Fig. 5, 6 and 9."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import NullLocator
 
 from neurosym.plotting.style import COLUMN, SMALL, TITLE, add_legend, look_of, tidy
 from neurosym.support.arrays import Numbers
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 #: Of an axis with many n only so many are named.
 MOST_TICKS = 7
@@ -53,8 +49,6 @@ def curves_figure(
         spread: adds a panel: the area of a dot is the share of test sequences with that share of steps right.
         log: whether n is on a logarithmic axis.
     """
-    from matplotlib.figure import Figure
-
     total = len(panels) + (spread is not None)
     figure = Figure(figsize=(COLUMN, 0.9 + 1.1 * total), layout="constrained")
     axes = figure.subplots(total, 1, sharex=True, squeeze=False)[:, 0]
@@ -106,8 +100,6 @@ def _bubbles(axis: Axes, spread: Spread) -> None:
 
 
 def _across(axis: Axes, sizes: Sequence[int], across: str, log: bool) -> None:
-    from matplotlib.ticker import NullLocator
-
     if log:
         axis.set_xscale("log")
         axis.xaxis.set_minor_locator(NullLocator())

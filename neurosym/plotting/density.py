@@ -1,19 +1,14 @@
 """How precision is distributed: over seeds, as the paper's Fig. 4 has it, and over single sequences."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
 from neurosym.plotting.style import COLUMN, SMALL, TITLE, add_legend, look_of, mark, papers_mark, tidy
 from neurosym.support.arrays import Array, Numbers
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 #: Least width of the Gaussian kernels: a hundred test pictures do not tell shares further apart.
 LEAST_WIDTH = 0.01
@@ -36,8 +31,6 @@ def density_figure(
         right: method -> int64 (T + 1, T + 1), test sequences by the number of steps and of those that are right.
         paper: method -> the paper's mean over seeds, a diamond.
     """
-    from matplotlib.figure import Figure
-
     methods = list(seeds)
     figure = Figure(figsize=(COLUMN, 1.0 + ROW * len(methods)), layout="constrained")
     over_seeds, over_sequences = figure.subplots(1, 2, sharey=True)

@@ -1,18 +1,15 @@
 """What was read wrong: confusion matrices, errors by letter, and by how many letters repeat (the paper's Fig. 8)."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import PowerNorm
+from matplotlib.figure import Figure
 
 from neurosym.plotting.style import COLUMN, SMALL, TITLE, add_legend, look_of, tidy
 from neurosym.support.arrays import Array, Numbers
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 Counts = Mapping[str, Numbers]
 
@@ -34,9 +31,6 @@ def confusion_figure(title: str, labels: Sequence[str], confusion: Counts) -> Fi
     `title`: of the figure. `labels`: names of the K classes. `confusion`: method -> int64 (K + 1, K + 1), steps by the
     class demonstrated and the class read. The last are steps that are not there, which are drawn where there are some.
     """
-    from matplotlib.colors import PowerNorm
-    from matplotlib.figure import Figure
-
     many = len(labels) > WRITTEN
     # The same rows and columns for all methods, or panels could not be compared.
     ends = any(int(own[-1].sum() + own[:, -1].sum()) for own in confusion.values())
@@ -63,8 +57,6 @@ def confusion_figure(title: str, labels: Sequence[str], confusion: Counts) -> Fi
 
 def classes_figure(title: str, labels: Sequence[str], confusion: Counts) -> Figure:
     """The share of each class's demonstrated steps that were read as another; arguments as of `confusion_figure`."""
-    from matplotlib.figure import Figure
-
     figure = Figure(figsize=(COLUMN, 2.3), layout="constrained")
     axis, k = figure.subplots(), len(labels)
     for position, (method, own) in enumerate(confusion.items()):
@@ -90,8 +82,6 @@ def repeats_figure(title: str, repeats: Counts) -> Figure:
     `title`: of the figure. `repeats`: method -> int64 (T, 4), by the number of repetitions: steps, wrong steps,
     pictures, wrong pictures.
     """
-    from matplotlib.figure import Figure
-
     figure = Figure(figsize=(COLUMN, 3.3), layout="constrained")
     steps, sequences = figure.subplots(2, 1, sharex=True)
     pictures = next(iter(repeats.values()))[:, 2]

@@ -1,27 +1,23 @@
 """What blocks what along each direction, and what touches what: graphs in layers, or matrices where parts are many."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import networkx as nx
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import FancyBboxPatch, Rectangle
 
+from neurosym.geometry.assembly import Assembly
+from neurosym.geometry.blocking.directions import Directions
+from neurosym.geometry.blocking.graph import BlockingGraph
 from neurosym.geometry.queries import AssemblyGeometry
 from neurosym.geometry.step_motion import GROUND
 from neurosym.plotting.layers import BOX, Layout, box_width, in_inches, in_layers, write_names
 from neurosym.plotting.matrices import blocking_matrices, contact_matrix, depths
 from neurosym.plotting.routes import Point, bends
 from neurosym.plotting.style import COLOURS, COLUMN, SMALL, TITLE
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from neurosym.geometry.assembly import Assembly
-    from neurosym.geometry.blocking.directions import Directions
-    from neurosym.geometry.blocking.graph import BlockingGraph
 
 #: More parts than this are drawn as a matrix.
 MOST_NODES = 16
@@ -176,8 +172,6 @@ def _write_note(axis: Axes, note: str) -> None:
 
 def _join(axis: Axes, pair: tuple[str, str], places: Mapping[str, Point], bend: float, look: Mapping[str, Any]) -> None:
     """A line from one box to another, from edge to edge."""
-    from matplotlib.patches import Rectangle
-
     patches = []
     for name in pair:
         (x, y), wide = places[name], box_width(name)
@@ -187,8 +181,6 @@ def _join(axis: Axes, pair: tuple[str, str], places: Mapping[str, Point], bend: 
 
 
 def _frame(axis: Axes, places: Sequence[tuple[float, float]], names: Sequence[str]) -> None:
-    from matplotlib.patches import FancyBboxPatch
-
     left = min(x - box_width(n) / 2 for (x, _), n in zip(places, names)) - 0.04
     right = max(x + box_width(n) / 2 for (x, _), n in zip(places, names)) + 0.04
     low, high = min(y for _, y in places) - BOX, max(y for _, y in places) + BOX

@@ -1,19 +1,14 @@
 """Small graphs drawn in rows: where boxes with names go, in inches, so that letters keep their size."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import networkx as nx
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from neurosym.plotting.style import COLUMN, shortened
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 #: Letters of names (points), and what one of them takes (inches).
 LETTERS, LETTER_WIDTH = 6.5, 0.058
@@ -79,8 +74,6 @@ def box_width(name: str) -> float:
 
 def in_inches(height: float, width: float = COLUMN) -> tuple[Figure, Axes]:
     """A figure with one set of axes, without a frame, whose units are inches from the lower left."""
-    from matplotlib.figure import Figure
-
     figure = Figure(figsize=(width, height))
     axis = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axis.set_xlim(0, width)

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from neurosym.planning.result import PlanResult
 from neurosym.plotting.style import COLOURS, COLUMN, TITLE, add_legend, mark, shortened, tidy, width_of, without_common
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 #: Refusals that are drawn, the first ones; the title says how many there were.
 MOST_REFUSALS = 300
@@ -46,8 +45,6 @@ def search_figure(result: PlanResult, *, title: str = "search") -> Figure:
 
     `result`: of any planner. `title`: what was planned, and how.
     """
-    from matplotlib.figure import Figure
-
     root, drawn = _tree(result)
     rows = _lay_out(root, 0)
     steps = max(node.step + (1 if node.refused else 0) for node in _all(root))

@@ -1,19 +1,18 @@
 """What all figures share: colours, the width of a column, how methods look, and how figures are saved."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
+
+import matplotlib
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure as Figure
+from matplotlib.lines import Line2D
+from matplotlib.textpath import TextPath
 
 from neurosym.support.files import replacing
-
-if TYPE_CHECKING:
-    from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure as Figure
-    from matplotlib.lines import Line2D
 
 #: Okabe and Ito's colours, told apart by people with any of the common colour deficiencies. One a prior, in order.
 COLOURS = ("#7f7f7f", "#E69F00", "#56B4E9", "#D55E00", "#0072B2", "#009E73", "#CC79A7", "#000000")
@@ -65,8 +64,6 @@ def tidy(axis: Axes, *, sides: tuple[str, ...] = ("top", "right")) -> None:
 
 def mark(marker: str, label: str, **look: Any) -> Line2D:
     """An entry of a legend for points."""
-    from matplotlib.lines import Line2D
-
     return Line2D([], [], **{"ls": "", "marker": marker, "label": label, **look})
 
 
@@ -87,8 +84,6 @@ def save(figure: Figure, path: str | Path, *, dpi: int = 200) -> Path:
     """
     with replacing(path) as temporary:
         if Path(path).suffix == ".svg":
-            import matplotlib
-
             # Identifiers in an SVG are random, and its date is now, unless told otherwise.
             with matplotlib.rc_context({"svg.hashsalt": Path(path).name}):
                 figure.savefig(temporary, metadata={"Date": None})
@@ -127,6 +122,4 @@ def without_common(names: Sequence[str]) -> dict[str, str]:
 
 def width_of(text: str, size: float) -> float:
     """How wide a text of so many points is drawn (inches)."""
-    from matplotlib.textpath import TextPath
-
     return float(TextPath((0, 0), text, size=size).get_extents().width) / 72 if text.strip() else 0.0
