@@ -35,10 +35,8 @@ from neurosym.support.arrays import Array
 from neurosym.support.bitsets import bits
 
 RULES = ("cubes", "strict", "rigid")
-
 #: Moving cubes that are still no collapse (the paper: "any", by its code more than one).
 MAY_MOVE = {"cubes": 1, "strict": 0}
-
 #: How far cubes over one another may be out of line, as a share of their edge.
 SQUARELY = 0.01
 

@@ -22,7 +22,6 @@ from neurosym.errors import UnknownNameError
 from neurosym.support.arrays import Array, Pixels
 
 HEIGHT, WIDTH = 32, 192
-
 #: Pictures are drawn so many times larger, then halved: edges are smooth.
 _FINE = 2
 #: Side of a tile and of the square around it, with room for its shadow, in pixels of the large drawing.

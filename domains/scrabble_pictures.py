@@ -15,10 +15,8 @@ from neurosym.support.disk_cache import cache_folder, fill
 
 #: Raise it whenever the same request would give other pixels.
 PICTURE_VERSION = 1
-
 #: A word's letters and the seed of its picture.
 Job = tuple[str, int]
-
 #: Pictures in one file, and drawn by one process at a time (a quarter of a second's work).
 CHUNK = 256
 
@@ -36,11 +34,8 @@ def cached_pictures(
     The same for any number of workers, and as `draw_word` makes them with each job's seed. A file holds 256 jobs that
     follow one another and is found again only if they do.
 
-    Args:
-        jobs: words with seeds.
-        workers: processes that draw what is missing; None takes one a core.
-        progress: called with (done, total).
-        folder: where the files are; None means the library's cache folder.
+    `jobs`: words with seeds. `workers`: processes that draw what is missing; None takes one a core. `progress`: called
+    with (done, total). `folder`: where the files are; None means the library's cache folder.
     """
     look = style_named(style)
     where = (cache_folder() if folder is None else Path(folder)) / "scrabble-pictures"

@@ -22,16 +22,12 @@ def _each(letters_of: dict[int, str]) -> dict[str, int]:
 COUNTS = _each({1: "jkqxz", 2: "bcfhmpvwy", 3: "g", 4: "dlsu", 6: "nrt", 8: "o", 9: "ai", 12: "e"})
 #: What a tile is worth; printed on it.
 VALUES = _each({1: "aeilnorstu", 2: "dg", 3: "bcmp", 4: "fhvwy", 5: "k", 8: "jx", 10: "qz"})
-
 #: Tiles in a word.
 SHORTEST, LONGEST = 3, 6
-
 #: Random problems of one split; the numbers of split s begin at s * (N_TRAIN + N_TEST), the training ones first.
 N_TRAIN, N_TEST = 10_000, 5_000
-
 #: One letter sequence in so many belongs to the test part.
 _TEST_SHARE = 3
-
 #: Kept apart from any user's seed.
 _WORD_STREAM, _LIST_STREAM = 0x5C_4A, 0x5C_4B
 

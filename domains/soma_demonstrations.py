@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     from neurosym.language import Problem
 
 RECIPES = ("full", "paper")
-
 #: Raise it whenever the same cube would get other labels: they are kept on disk.
 LABELS_VERSION = 1
 

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from neurosym.support.arrays import Numbers
 
 Cell = tuple[int, int, int]
-
 #: Letter -> cells. A and B are mirror images of each other.
 PIECES: dict[str, tuple[Cell, ...]] = {
     "V": ((0, 0, 0), (1, 0, 0), (0, 1, 0)),
@@ -25,7 +24,6 @@ PIECES: dict[str, tuple[Cell, ...]] = {
 }
 
 LETTERS: tuple[str, ...] = tuple(PIECES)
-
 #: A mirror turns A into B; all other pieces are their own mirror images.
 MIRRORED: dict[str, str] = {"A": "B", "B": "A"}
 

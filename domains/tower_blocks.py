@@ -18,7 +18,6 @@ from neurosym.support.arrays import Array
 
 #: What makes blocks interchangeable: a colour and a size (width along x, depth along y, height).
 Kind = tuple[str, tuple[float, float, float]]
-
 #: Colours of blocks, RGB in 0..1. Their hues lie far enough apart to stay themselves in the hard pictures.
 COLOURS: Mapping[str, tuple[float, float, float]] = {
     "red": (0.82, 0.12, 0.10),

@@ -36,11 +36,7 @@ def _matches(world: ReferenceTower, state: State, b: str) -> Verdict:
 
 
 def _before(world: ReferenceTower, state: State, level: int, kind: Kind) -> tuple[str, ...]:
-    """Blocks of which one must be placed before a level asks for `kind`; none: no level will.
-
-    Every level in between must be built. Of the kinds they ask for, the one asked for last, for the first time,
-    keeps the promise longest.
-    """
+    """Blocks of which one must be placed before a level asks for `kind`; none: no level will."""
     if kind not in world.reference[level:]:
         return ()
     between = world.reference[level : world.reference.index(kind, level)]

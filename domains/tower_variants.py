@@ -67,13 +67,9 @@ def colours_of(variant: str, number: int) -> tuple[str, ...]:
 def split_numbers(variant: str, part: str, split: int, by: str) -> tuple[int, ...]:
     """Numbers of the towers of a part, ``"train"``, ``"test"`` or ``"all"``, in random order ("all" in their own).
 
-    Args:
-        split: which random split. A tower of `heights` that is one of `colours` too is in the same part of both.
-        by: ``"tower"`` deals out towers, ``"sequence"`` colour sequences with all their towers.
-
-    Raises:
-        UnknownNameError: no such variant, part or way to divide.
-        InputError: a split below 0.
+    `split`: which random split. A tower of `heights` that is one of `colours` too is in the same part of both. `by`:
+    ``"tower"`` deals out towers, ``"sequence"`` colour sequences with all their towers. Raises UnknownNameError: no
+    such variant, part or way to divide; InputError: a split below 0.
     """
     if by not in DIVIDED:
         raise UnknownNameError("way to split", by, DIVIDED)
@@ -92,11 +88,7 @@ def split_numbers(variant: str, part: str, split: int, by: str) -> tuple[int, ..
 
 @cache
 def _trains(variant: str, split: int, by: str) -> Truths:
-    """bool (n_towers,): which towers are to train.
-
-    The towers of six levels among ``heights`` are those of ``colours``, and go where these go: what was trained on the
-    one is tested on the other without having seen it.
-    """
+    """bool (n_towers,): which towers are to train."""
     known = towers(variant)
     ids = np.array(sequence_numbers(variant)) if by == "sequence" else np.arange(len(known))
     divided = np.full(ids.max() + 1, False)

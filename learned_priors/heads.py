@@ -11,7 +11,6 @@ from learned_priors.encoders import Encoder
 
 #: Each temporal layer looks at a step and one before, as in the reference network; dilation widens that to all steps.
 KERNEL = 2
-
 #: Glimpses a step. With one, training was stuck in half of the runs: where all pictures show the same colours in other
 #: orders, a glimpse that is too wide sees the same in all, and nothing says where to turn.
 GLIMPSES = 4

@@ -16,13 +16,9 @@ def decoded(log_prob: ArrayLike, classes: Sequence[int] = (), *, log_length: Arr
     With unsure lengths, the likeliest number of steps is taken first, then the best assignment to these steps (the
     paper's masking, Sec. IV-B).
 
-    Args:
-        log_prob: (M, T, N), log-probability of each action at each step.
-        classes: one integer an action; the probabilities of one class are summed.
-        log_length: (M, T + 1), log-probability of 0 .. T steps; None where there are always T.
-
-    Returns:
-        int64 (M, T), -1 after the last step.
+    `log_prob`: (M, T, N), log-probability of each action at each step. `classes`: one integer an action; the
+    probabilities of one class are summed. `log_length`: (M, T + 1), log-probability of 0 .. T steps; None where there
+    are always T. Returns int64 (M, T), -1 after the last step.
     """
     tables = np.asarray(log_prob, dtype=np.float64)
     orders = np.full(tables.shape[:2], -1, dtype=np.int64)

@@ -52,9 +52,7 @@ class NetworkPrior(Prior):
         device: str = "cpu",
     ) -> None:
         self.recipe = recipe if isinstance(recipe, Recipe) else recipe_named(recipe)
-        self.domain = domain
-        self.encoder = encoder
-        self.device = _checked_device(device)
+        self.domain, self.encoder, self.device = domain, encoder, _checked_device(device)
         self._weights = WeightStore(self.recipe, domain, encoder, self.device)
         if weights is not None:
             self._weights.own = self._weights.load(Path(weights))
@@ -156,17 +154,9 @@ class NetworkPrior(Prior):
         given, train = self.recipe.configured(
             demonstrations, encoder=self.encoder or "small", epochs=epochs, config=config, settings=settings
         )
+        run: dict[str, Any] = {"seed": seed, "device": self.device, "progress": progress, "resume": resume}
         kept = Path(checkpoint) if checkpoint else None
-        network, figures = fit(
-            demonstrations,
-            given,
-            train,
-            seed=seed,
-            device=self.device,
-            progress=progress,
-            checkpoint=kept,
-            resume=resume,
-        )
+        network, figures = fit(demonstrations, given, train, checkpoint=kept, **run)
         header = {
             "prior": self.recipe.name,
             "domain": demonstrations.domain,

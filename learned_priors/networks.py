@@ -20,10 +20,8 @@ from neurosym.support.arrays import Array, Pixels
 Head = Literal["dense", "tcn", "glimpses"]
 Decoding = Literal["sinkhorn", "rows"]
 Stop = Literal["none", "head", "network", "class"]
-
 #: Column updates when reading: after so many, columns of near ties are off by about 1e-3 (see `MAX_ITERATIONS`).
 READ_ITERATIONS = 1_000
-
 #: Pictures prepared, or read, at a time: bounds the memory that float copies of them take.
 CHUNK = 256
 

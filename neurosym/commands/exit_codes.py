@@ -9,7 +9,6 @@ UNWELL = 1
 BAD_INPUT = 33
 #: Interrupted from the keyboard (128 + SIGINT, as shells count).
 INTERRUPTED = 130
-
 #: Exit code -> what it means.
 EXIT_CODES: dict[int, str] = {
     **{status.exit_code: status.sentence for status in Status},

@@ -4,7 +4,6 @@ A prior that looks must beat them. They are calculated, not trained.
 """
 
 from collections.abc import Callable, Hashable, Mapping, Sequence
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -17,7 +16,6 @@ from neurosym.support.arrays import Array
 
 #: As `compare_orders` gives them: metric -> float64 (M,), a value a test picture.
 Figures = dict[str, Array]
-
 #: Questions to the oracle after which the search for the best fixed order stops with the best it has.
 MAX_ATTEMPTS = 2_000_000
 
@@ -67,9 +65,7 @@ def blind(train: Demonstrations, test: Demonstrations) -> Figures:
 
 
 #: By their names in tables.
-BASELINES: Mapping[str, Callable[[Demonstrations, Demonstrations], Figures]] = MappingProxyType(
-    {"memoriser": memoriser, "blind": blind}
-)
+BASELINES: Mapping[str, Callable[[Demonstrations, Demonstrations], Figures]] = {"memoriser": memoriser, "blind": blind}
 
 
 def order_fails(search: SearchProblem[Any], order: Sequence[int]) -> bool:

@@ -28,10 +28,8 @@ from neurosym.registry import load_domain, load_planner, load_prior
 
 #: The name of planning without a prior, in tables and on the command line.
 NO_PRIOR = "none"
-
 #: Raise it whenever the same comparison would give other runs, so that no journal answers for it.
 RUNS_VERSION = 3
-
 #: (planner, prior, seed)
 Cell = tuple[str, str, int]
 #: Prior -> its scores, one a problem.
@@ -43,9 +41,7 @@ class Comparison:
     """What is compared, on what.
 
     Attributes:
-        domain: name of the problem family.
-        numbers: which of its problems.
-        planners: names of planners.
+        numbers: which problems of the domain.
         priors: names of priors or of weights files; `NO_PRIOR` plans without.
         options: passed to ``family.problem(number, **options)``, for Soma collapse and pictures.
         oracle: ``"geometry"`` or ``"physics"``.
@@ -158,14 +154,9 @@ def run(
 ) -> tuple[Run, ...]:
     """All runs of a comparison; the same, times excepted, for any number of workers.
 
-    Args:
-        scores: what `ask_priors` gives; None asks.
-        journal: file (JSON lines) that keeps finished runs; those it has are not run again.
-        progress: called with (done, total) runs.
-        workers, where: where problems are solved, see `neurosym.experiments.engines.run_tasks`.
-
-    Raises:
-        ContractError: a planner's plan does not survive its replay.
+    `scores`: what `ask_priors` gives; None asks. `journal`: file (JSON lines) that keeps finished runs; those it has
+    are not run again. `progress`: called with (done, total) runs. `workers, where`: where problems are solved, see
+    `neurosym.experiments.engines.run_tasks`. Raises ContractError: a planner's plan does not survive its replay.
     """
     scores = ask_priors(comparison, workers=min(workers or cores(), cores())) if scores is None else scores
     kept = Journal(journal)

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Mapping
 from itertools import combinations
-from types import MappingProxyType
 from typing import Any
 
 from neurosym.experiments.studies import Results
@@ -109,7 +108,6 @@ def _at(results: Results, n: int) -> str:
 
 #: Shares that differ by less are called alike.
 ALIKE = 0.05
-
 #: Whether it holds, and the numbers that decide; None where the results do not bear on it.
 Answer = tuple[bool, str] | None
 #: Called with the results and a style of pictures.
@@ -185,33 +183,31 @@ def _unassigned_re_use(results: Results, style: str) -> Answer:
 
 
 #: By study: what the paper says. Its order of the five methods is checked by `neurosym.experiments.conclusions`.
-OF_THE_PAPER: Mapping[str, tuple[Hypothesis, ...]] = MappingProxyType(
-    {
-        "tower": (("BC and BC+TCN use blocks twice, the others never do.", _unassigned_re_use),),
-        "unseen": (
-            (
-                "With unique actions BC+Sinkhorn and BC+TCN perform similarly (steps right).",
-                alike("sinkhorn-paper", "tcn-paper", "per_step"),
-            ),
-            ("BC+Sinkhorn is above the memoriser's line.", ahead("sinkhorn-paper", "memoriser", "per_step")),
-            ("BC+TCN is above the memoriser's line.", ahead("tcn-paper", "memoriser", "per_step")),
+OF_THE_PAPER: Mapping[str, tuple[Hypothesis, ...]] = {
+    "tower": (("BC and BC+TCN use blocks twice, the others never do.", _unassigned_re_use),),
+    "unseen": (
+        (
+            "With unique actions BC+Sinkhorn and BC+TCN perform similarly (steps right).",
+            alike("sinkhorn-paper", "tcn-paper", "per_step"),
         ),
-        "variable": (
-            (
-                "BC+Sinkhorn is ahead of BC+TCN+Hungarian (steps right).",
-                ahead("sinkhorn-paper", "tcn-paper+hungarian", "per_step"),
-            ),
-            (
-                "The stopping network knows the length from about 200 demonstrations on (at least .99).",
-                reaches("sinkhorn-paper", "stop_accuracy", 0.99, from_n=200),
-            ),
+        ("BC+Sinkhorn is above the memoriser's line.", ahead("sinkhorn-paper", "memoriser", "per_step")),
+        ("BC+TCN is above the memoriser's line.", ahead("tcn-paper", "memoriser", "per_step")),
+    ),
+    "variable": (
+        (
+            "BC+Sinkhorn is ahead of BC+TCN+Hungarian (steps right).",
+            ahead("sinkhorn-paper", "tcn-paper+hungarian", "per_step"),
         ),
-        "scrabble": (
-            ("With more actions BC+Sinkhorn loses little, BC+TCN+Hungarian much (letters right).", _loses_less),
-            ("The TCN errs more where letters repeat.", _tcn_errs_more_with_repeats),
+        (
+            "The stopping network knows the length from about 200 demonstrations on (at least .99).",
+            reaches("sinkhorn-paper", "stop_accuracy", 0.99, from_n=200),
         ),
-    }
-)
+    ),
+    "scrabble": (
+        ("With more actions BC+Sinkhorn loses little, BC+TCN+Hungarian much (letters right).", _loses_less),
+        ("The TCN errs more where letters repeat.", _tcn_errs_more_with_repeats),
+    ),
+}
 
 
 def _ours(statement: str, metric: str, bound: float, **more: Any) -> Hypothesis:
@@ -219,25 +215,23 @@ def _ours(statement: str, metric: str, bound: float, **more: Any) -> Hypothesis:
 
 
 #: By study: what is asked of `sinkhorn`.
-OF_OURS: Mapping[str, tuple[Hypothesis, ...]] = MappingProxyType(
-    {
-        "tower": (
-            _ours("At least .85 whole on hard pictures.", "whole_sequence", 0.85, style="hard"),
-            _ours("No block twice.", "re_use", 0.0, above=False),
-            _ours("Trained in at most 30 s.", "training_seconds", 30, above=False),
-        ),
-        "unseen": (
-            ("Above the memoriser's line (steps right).", ahead("sinkhorn", "memoriser", "per_step")),
-            _ours("At least .9 of the steps from 200 towers on.", "per_step", 0.9, from_n=200),
-        ),
-        "variable": (
-            _ours("At least .95 whole sequences from 400 demonstrations on.", "whole_sequence", 0.95, from_n=400),
-            _ours("Stops at the right length in at least .99.", "stop_accuracy", 0.99, from_n=400),
-        ),
-        "scrabble": (
-            _ours("At least .97 of the letters, 98 tiles.", "per_step", 0.97, from_n=98),
-            _ours("At least .93 of the words, 98 tiles.", "whole_sequence", 0.93, from_n=98),
-            _ours("Trained in at most 3 minutes, 98 tiles.", "training_seconds", 180, above=False, from_n=98),
-        ),
-    }
-)
+OF_OURS: Mapping[str, tuple[Hypothesis, ...]] = {
+    "tower": (
+        _ours("At least .85 whole on hard pictures.", "whole_sequence", 0.85, style="hard"),
+        _ours("No block twice.", "re_use", 0.0, above=False),
+        _ours("Trained in at most 30 s.", "training_seconds", 30, above=False),
+    ),
+    "unseen": (
+        ("Above the memoriser's line (steps right).", ahead("sinkhorn", "memoriser", "per_step")),
+        _ours("At least .9 of the steps from 200 towers on.", "per_step", 0.9, from_n=200),
+    ),
+    "variable": (
+        _ours("At least .95 whole sequences from 400 demonstrations on.", "whole_sequence", 0.95, from_n=400),
+        _ours("Stops at the right length in at least .99.", "stop_accuracy", 0.99, from_n=400),
+    ),
+    "scrabble": (
+        _ours("At least .97 of the letters, 98 tiles.", "per_step", 0.97, from_n=98),
+        _ours("At least .93 of the words, 98 tiles.", "whole_sequence", 0.93, from_n=98),
+        _ours("Trained in at most 3 minutes, 98 tiles.", "training_seconds", 180, above=False, from_n=98),
+    ),
+}

@@ -21,7 +21,6 @@ from neurosym.language.problem_family import Progress
 from neurosym.registry import load_domain, load_prior
 
 __all__ = ["Results", "Study", "Trial", "report", "reproduce_study", "run_trial", "study", "study_names"]
-
 #: Raise it whenever the same trial would give other figures, so that no journal answers for it.
 TRIALS_VERSION = 3
 
@@ -37,11 +36,8 @@ def reproduce_study(
 ) -> Results:
     """Run the trials that are not done yet; write results.csv, report.md and figures into `out`.
 
-    Args:
-        epochs: None takes each recipe's.
-        say: called with a line about what is going on.
-        progress: called with (done, total) trials.
-        where: workers, engine and address: where trials run, see `neurosym.experiments.engines.run_tasks`.
+    `epochs`: None takes each recipe's. `say`: called with a line about what is going on. `progress`: called with (done,
+    total) trials. `where`: workers, engine and address: where trials run, see `neurosym.experiments.engines.run_tasks`.
     """
     journal = Journal(out / "trials.jsonl")
     keys = {trial: _key(given, trial, epochs) for trial in given.trials()}

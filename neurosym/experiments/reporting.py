@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from neurosym.plotting.style import Figure
 
 Row = dict[str, Any]
-
 #: Columns of results.csv of the paper's experiments: a line a number.
 RECORD = ["experiment", "pictures", "method", "n", "seed", "metric", "value"]
 #: What is published of a planner and prior, each with its deviation.

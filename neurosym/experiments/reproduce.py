@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 import pandas as pd
@@ -26,12 +25,10 @@ from neurosym.registry import load_domain, load_prior
 from neurosym.support.files import write_text, written_whole
 
 __all__ = ["Cell", "Experiment", "report", "reproduce", "soma_experiment", "train_cell"]
-
 #: Called with one line about what is going on.
 Say = Callable[[str], None]
-
 #: What a scale changes; the paper splits the cubes 100 times.
-SCALES: Mapping[str, Mapping[str, Any]] = MappingProxyType({"quick": {"splits": 3}, "paper": {"splits": 100}})
+SCALES: Mapping[str, Mapping[str, Any]] = {"quick": {"splits": 3}, "paper": {"splits": 100}}
 
 
 @dataclass(frozen=True)
@@ -51,11 +48,9 @@ class Experiment:
     """What is rebuilt.
 
     Attributes:
-        domain: the problem family.
         splits: random splits into train and test, 0 .. splits - 1; each is trained and tested once.
         styles: styles of pictures; trained and tested on the same style.
-        methods: priors that are trained.
-        planners: planners that use them.
+        methods, planners: priors that are trained, and planners that use them.
         repeats: how often each test problem is planned.
         seed: of pictures and training.
         epochs: None takes each recipe's.
@@ -104,13 +99,9 @@ def reproduce(
 ) -> pd.DataFrame:
     """Train what is not trained yet, compare, and write results.csv, report.md and figures into `out`.
 
-    Args:
-        engine, address, where: where networks are trained and problems solved, see `engines.run_tasks`.
-        say: called with a line about what is going on.
-        progress: called with (done, total) trainings and comparisons.
-
-    Returns:
-        The lines of results.csv.
+    `engine, address, where`: where networks are trained and problems solved, see `engines.run_tasks`. `say`: called
+    with a line about what is going on. `progress`: called with (done, total) trainings and comparisons. Returns the
+    lines of results.csv.
     """
     _same_experiment(experiment, out)
     cells = experiment.cells
@@ -158,10 +149,7 @@ def train_cell(experiment: Experiment, cell: Cell, checkpoint: Path | None) -> t
 def _train_all(
     experiment: Experiment, missing: Sequence[Cell], out: Path, run: Callable[..., Any], *, keep: bool
 ) -> Iterator[str]:
-    """Train, and write each network's weights here, whoever trained it; a line about each.
-
-    `keep`: whether a network's checkpoint is kept beside its weights: other machines do not see them.
-    """
+    """Train, and write each network's weights here, whoever trained it; a line about each."""
 
     def checkpoint(cell: Cell) -> Path | None:
         return cell.path(out).absolute().with_suffix(".checkpoint") if keep else None

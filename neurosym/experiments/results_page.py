@@ -11,7 +11,6 @@ from neurosym.support.files import replacing, write_text
 LARGEST = 60_000
 #: Colours that a figure is reduced to, the first number with which it is small enough.
 PALETTES = (256, 128, 64, 32)
-
 #: The paper's experiments as the paper has them; others come after, by name.
 ORDER = ("tower", "tower-by-sequence", "unseen", "variable", "soma", "scrabble")
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import astuple, dataclass, field, replace
 from functools import cached_property
-from types import MappingProxyType
 from typing import Any
 
 import pandas as pd
@@ -15,7 +14,6 @@ from neurosym.experiments.order_accuracy import Counts
 from neurosym.experiments.reporting import RECORD, values_by
 
 Options = Callable[[int], dict[str, Any]]
-
 #: `quick` finishes within 15 minutes on two cores, a study; `paper` has the paper's sizes and seeds.
 SCALES = ("quick", "paper")
 
@@ -36,8 +34,6 @@ class Study:
     """A grid of trials.
 
     Attributes:
-        name: on the command line.
-        domain: the family.
         methods: what is compared, the paper's first, ours last.
         sizes: values of n.
         what: what n counts, for tables.
@@ -45,12 +41,10 @@ class Study:
         test: n -> options of the test demonstrations.
         part: of the problems, on which is tested ("test", or "all" where the paper tests on everything).
         published: method -> the paper's figures, by metric.
-        pictures: styles.
         seeds: how often; each seed is another split and another training.
         train: method -> settings of its training that differ here from its recipe's.
         baselines: names in `neurosym.experiments.baselines.BASELINES`; calculated for each style, n and seed.
         ours: which of the methods is not the paper's.
-        about: what is asked, in a sentence.
         figures: kinds of figures, see `neurosym.experiments.study_report`.
     """
 
@@ -241,28 +235,24 @@ _SCRABBLE = Study(
     about="Words of three to six of the first n tiles (the paper's Sec. IV-E, Fig. 8 and 9).",
     figures=("curves", "classes", "repeats", "confusion"),
 )
-_QUICK: Mapping[str, Study] = MappingProxyType(
-    {study.name: study for study in (_TOWER, _BY_SEQUENCE, _UNSEEN, _VARIABLE, _SCRABBLE)}
-)
+_QUICK: Mapping[str, Study] = {study.name: study for study in (_TOWER, _BY_SEQUENCE, _UNSEEN, _VARIABLE, _SCRABBLE)}
 
 #: What the paper's scale changes, by study.
-_PAPER: Mapping[str, Mapping[str, Any]] = MappingProxyType(
-    {
-        # "repeated 20 times for models trained using different random seeds" (Sec. IV-A)
-        "tower": {"seeds": 20},
-        "tower-by-sequence": {"seeds": 20},
-        # The paper says "increasing numbers"; ours go on to all that a split has to train on.
-        "unseen": {"sizes": (25, 50, 100, 150, 200, 300, 400, 480), "seeds": 20},
-        "variable": {
-            "sizes": (50, 100, 200, 300, 400, 600, 800, 1000, 1300),
-            "test": _options(variant="heights"),
-            "seeds": 20,
-        },
-        # 10,000 pictures to learn from, 5,000 to test; "an increasingly large subset of the full tile set" (Sec. IV-E)
-        "scrabble": {
-            "sizes": (*range(6, 97, 5), 98),
-            "test": _options(tiles="n", count=5_000),
-            "train": {"tcn-paper+hungarian": _WORDS, "sinkhorn-paper": _WORDS},
-        },
-    }
-)
+_PAPER: Mapping[str, Mapping[str, Any]] = {
+    # "repeated 20 times for models trained using different random seeds" (Sec. IV-A)
+    "tower": {"seeds": 20},
+    "tower-by-sequence": {"seeds": 20},
+    # The paper says "increasing numbers"; ours go on to all that a split has to train on.
+    "unseen": {"sizes": (25, 50, 100, 150, 200, 300, 400, 480), "seeds": 20},
+    "variable": {
+        "sizes": (50, 100, 200, 300, 400, 600, 800, 1000, 1300),
+        "test": _options(variant="heights"),
+        "seeds": 20,
+    },
+    # 10,000 pictures to learn from, 5,000 to test; "an increasingly large subset of the full tile set" (Sec. IV-E)
+    "scrabble": {
+        "sizes": (*range(6, 97, 5), 98),
+        "test": _options(tiles="n", count=5_000),
+        "train": {"tcn-paper+hungarian": _WORDS, "sinkhorn-paper": _WORDS},
+    },
+}

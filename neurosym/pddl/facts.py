@@ -25,11 +25,8 @@ Fact = Literal | Mark
 class Operator:
     """What a planner may do.
 
-    Attributes:
-        name: in words; operators of one action may share it.
-        action: the action primitive it stands for, None for a helper.
-        how: in which way, in words; may be empty.
-        pre, add, delete: facts, all positive.
+    `name`: in words; operators of one action may share it. `action`: the action primitive it stands for, None for a
+    helper. `how`: in which way, in words; may be empty. `pre, add, delete`: facts, all positive.
     """
 
     name: str

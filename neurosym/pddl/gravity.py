@@ -29,12 +29,9 @@ Asked = Mapping[str, Stands | None]
 class Weighed:
     """What gravity makes of ground actions.
 
-    Attributes:
-        instances: those that can ever be done, with conditions under which nothing falls after them.
-        helpers: operators that note that one of several facts holds.
-        kept: the marks that helpers set -> those facts; what takes one of them away takes the mark away.
-        sound: whether all falls are known.
-        note: a sentence on how they were found.
+    `instances`: those that can ever be done, with conditions under which nothing falls after them. `helpers`: operators
+    that note that one of several facts holds. `kept`: the marks that helpers set -> those facts; what takes one of them
+    away takes the mark away. `sound`: whether all falls are known. `note`: a sentence on how they were found.
     """
 
     instances: list[Instance]
@@ -86,11 +83,8 @@ def weighed(
 ) -> Weighed:
     """Add to the ways of each removal that no fall can happen after it.
 
-    Args:
-        instances: with their ways, gravity left out.
-        asked: see `standing_asked`; one at least asks.
-        refuted: orders of action primitives in which something falls.
-        seconds: for the search for falls.
+    `instances`: with their ways, gravity left out. `asked`: see `standing_asked`; one at least asks. `refuted`: orders
+    of action primitives in which something falls. `seconds`: for the search for falls.
     """
     from neurosym.geometry.stability.falls import find_falls  # geometry is no part of the language
 

@@ -48,10 +48,7 @@ def _compiled(
     sound: bool = True,
     notes: tuple[str, ...] = (),
 ) -> Strips:
-    """One operator a way of each instance, with what keeps up negative conditions, the order and single use.
-
-    `helpers, kept`: see `pddl_gravity.Weighed`.
-    """
+    """One operator a way of each instance, with what keeps up negative conditions, the order and single use."""
     names, initial = set(problem.actions), frozenset(problem.init)
     before = [(a, b) for a, b in problem.before if a in names and b in names]
     made = {a for i in instances for a in i.add}

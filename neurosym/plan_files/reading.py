@@ -25,11 +25,8 @@ COUNTS = ("iterations", "attempts", "expansions", "seconds")
 class SavedPlan:
     """A plan from a file.
 
-    Attributes:
-        problem: made again from what the file says of it.
-        plan: names of the actions, in order.
-        motions: one a step; None where the file says none.
-        document: the whole file.
+    `problem`: made again from what the file says of it. `plan`: names of the actions, in order. `motions`: one a step;
+    None where the file says none. `document`: the whole file.
     """
 
     problem: Problem

@@ -113,11 +113,8 @@ class PlanResult:
 class OrderCount:
     """In how many orders a goal can be reached.
 
-    Attributes:
-        orders: the number; None where the budget ended first.
-        exact: whether there are no others; False where something was refused without proof.
-        states: how many were looked at.
-        seconds: wall-clock time.
+    `orders`: the number; None where the budget ended first. `exact`: whether there are no others; False where something
+    was refused without proof. `states`: how many were looked at. `seconds`: wall-clock time.
     """
 
     orders: int | None

@@ -12,7 +12,6 @@ from neurosym.planning.order_scores import OrderScores
 from neurosym.planning.result import Plan, PlanResult, Status
 
 S = TypeVar("S", bound=Hashable)
-
 #: Rejections kept as evidence in a result. Beyond it only the count goes on: a hard search would fill the memory.
 MAX_BLAME = 10_000
 

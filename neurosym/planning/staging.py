@@ -15,15 +15,9 @@ def stage(problem: Problem, plan: Sequence[str], motions: Sequence[StepMotion | 
     Where a step's motion does not say which parts move, the problem's `Simulation` does; failing that, the effects: an
     action takes away the parts about which it only deletes atoms, else it brings those about which it only adds some.
 
-    Args:
-        problem: what was planned.
-        plan: names of actions, in order.
-        motions: one a step, or none at all, as `PlanResult.motions` has them; for None a free straight line is looked
-            for.
-
-    Raises:
-        InputError: the problem does not say what its actions do to parts, or not one motion a step.
-        UnknownNameError: a name in the plan that is no action.
+    `problem`: what was planned. `plan`: names of actions, in order. `motions`: one a step, or none at all, as
+    `PlanResult.motions` has them; for None a free straight line is looked for. Raises InputError: the problem does not
+    say what its actions do to parts, or not one motion a step; UnknownNameError: a name in the plan that is no action.
     """
     check_motions(motions, len(plan))
     for name in plan:

@@ -42,12 +42,8 @@ def curves_figure(
 ) -> Figure:
     """Panels one above the other: a line is the mean over seeds, its band reaches from the least to the greatest.
 
-    Args:
-        title: of the figure.
-        across: what n counts.
-        panels: what is drawn.
-        spread: adds a panel: the area of a dot is the share of test sequences with that share of steps right.
-        log: whether n is on a logarithmic axis.
+    `title`: of the figure. `across`: what n counts. `panels`: what is drawn. `spread`: adds a panel: the area of a dot
+    is the share of test sequences with that share of steps right. `log`: whether n is on a logarithmic axis.
     """
     total = len(panels) + (spread is not None)
     figure = Figure(figsize=(COLUMN, 0.9 + 1.1 * total), layout="constrained")

@@ -12,7 +12,6 @@ from neurosym.plotting.style import COLUMN, SMALL, TITLE, add_legend, look_of, t
 from neurosym.support.arrays import Array, Numbers
 
 Counts = Mapping[str, Numbers]
-
 #: How a step that is not there is called.
 NONE = "none"
 #: With more classes than these no share is written into its cell, and letters are smaller.

@@ -31,11 +31,8 @@ def in_layers(
 ) -> Layout:
     """Names in layers, the first on top, each layer sorted so that few edges cross.
 
-    Args:
-        layers: names, each once; their order is where the sorting starts.
-        edges: pairs of names that are joined.
-        width: of the drawing (inches); a layer that is wider is staggered.
-        apart: from one layer to the next (inches).
+    `layers`: names, each once; their order is where the sorting starts. `edges`: pairs of names that are joined.
+    `width`: of the drawing (inches); a layer that is wider is staggered. `apart`: from one layer to the next (inches).
     """
     graph = nx.Graph([(a, b) for a, b in edges if a != b])
     graph.add_nodes_from(name for layer in layers for name in layer)

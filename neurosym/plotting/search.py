@@ -16,7 +16,6 @@ from neurosym.plotting.style import COLOURS, COLUMN, TITLE, add_legend, mark, sh
 MOST_REFUSALS = 300
 #: More rows than this are drawn without names; of many steps so many bear a number.
 MOST_NAMES, MOST_TICKS = 60, 10
-
 #: Size of names (points), and the least number of letters that a cut one has.
 _LETTERS, _LEAST = 6.0, 4
 #: Where branches leave a node, in steps.

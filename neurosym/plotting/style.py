@@ -1,8 +1,7 @@
 """What all figures share: colours, the width of a column, how methods look, and how figures are saved."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import matplotlib
@@ -16,10 +15,8 @@ from neurosym.support.files import replacing
 
 #: Okabe and Ito's colours, told apart by people with any of the common colour deficiencies. One a prior, in order.
 COLOURS = ("#7f7f7f", "#E69F00", "#56B4E9", "#D55E00", "#0072B2", "#009E73", "#CC79A7", "#000000")
-
 #: Width of one column of a two-column page (inches).
 COLUMN = 3.4
-
 #: Sizes of letters (points): of titles and names of axes, and of all else.
 TITLE, SMALL = 8, 7
 
@@ -33,20 +30,18 @@ class Look(NamedTuple):
 
 
 #: The same in all figures.
-LOOKS = MappingProxyType(
-    {
-        "bc": Look("#56B4E9", "v"),
-        "bc+hungarian": Look("#0072B2", "^"),
-        "tcn-paper": Look("#E69F00", "s"),
-        "tcn-paper+hungarian": Look("#D55E00", "D"),
-        "sinkhorn-paper": Look("#009E73", "P"),
-        "tcn": Look("#CC79A7", "X"),
-        "sinkhorn": Look("#000000", "o"),
-        "memoriser": Look("0.35", "", "--"),
-        "blind": Look("0.35", "", ":"),
-        "random": Look("0.5", "."),
-    }
-)
+LOOKS: Mapping[str, Look] = {
+    "bc": Look("#56B4E9", "v"),
+    "bc+hungarian": Look("#0072B2", "^"),
+    "tcn-paper": Look("#E69F00", "s"),
+    "tcn-paper+hungarian": Look("#D55E00", "D"),
+    "sinkhorn-paper": Look("#009E73", "P"),
+    "tcn": Look("#CC79A7", "X"),
+    "sinkhorn": Look("#000000", "o"),
+    "memoriser": Look("0.35", "", "--"),
+    "blind": Look("0.35", "", ":"),
+    "random": Look("0.5", "."),
+}
 _OTHERS = (Look("#CC79A7", "<"), Look("#7f7f7f", ">"), Look("#0072B2", "*"), Look("#D55E00", "h"))
 
 

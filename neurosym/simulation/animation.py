@@ -15,7 +15,6 @@ from neurosym.support.arrays import Pixels
 
 #: Called with (done, total) pictures.
 Progress = Callable[[int, int], None]
-
 #: Seconds that a step's motion takes, and that the result is held before the next, in a film of few steps.
 STEP_SECONDS, HOLD_SECONDS = 1.0, 0.2
 #: Steps go faster where all of them would take longer than so many seconds, but none takes less than so many.
@@ -39,11 +38,8 @@ def frames(
     What leaves moves along its path and then is gone; what arrives comes in along it. What made way goes back. Parts
     that are held are set off by a thick line. A group that left together is taken apart by itself.
 
-    Args:
-        title: stands below the first and the last picture.
-        size: width and height in pixels, without the words below.
-        camera: from which side; None takes `best_camera`.
-        progress: called with (done, total).
+    `title`: stands below the first and the last picture. `size`: width and height in pixels, without the words below.
+    `camera`: from which side; None takes `best_camera`. `progress`: called with (done, total).
     """
     colours, count = part_colours(staging), len(staging.motions)
     moving, held, ends = pace(count)

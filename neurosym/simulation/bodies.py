@@ -133,11 +133,8 @@ MOST_JOINED = 16
 def collision_shape(p: Any, body: RigidBody, shapes: dict[tuple[float, ...], int], folder: Path) -> int:
     """The number of a collision shape in the body's centre-of-mass frame.
 
-    Args:
-        p: the simulator.
-        body: what the shape is made of.
-        shapes: half edges -> shape, of single boxes made before: those of one size share theirs.
-        folder: for the files that PyBullet wants; they may go once the shape is there.
+    `p`: the simulator. `body`: what the shape is made of. `shapes`: half edges -> shape, of single boxes made before:
+    those of one size share theirs. `folder`: for the files that PyBullet wants; they may go once the shape is there.
     """
     first = body.solids[0]
     if len(body.solids) == 1 and first.half is not None:
@@ -180,10 +177,7 @@ def collision_shape(p: Any, body: RigidBody, shapes: dict[tuple[float, ...], int
 
 
 def _obj(hulls: list[Array], folder: Path) -> str:
-    """Write corners as a file, an object a hull, since PyBullet joins meshes to a compound from files only.
-
-    It takes the hulls of the corners, and it remembers files by name: the name is a digest of the content.
-    """
+    """Write corners as a file, an object a hull, since PyBullet joins meshes to a compound from files only."""
     lines, first = [], 1
     for number, vertices in enumerate(hulls):
         lines.append(f"o hull{number or ''}")

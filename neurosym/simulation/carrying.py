@@ -14,7 +14,6 @@ from neurosym.simulation.world import World
 
 #: Position and quaternion (x, y, z, w) of a body's centre-of-mass frame, in the scene's scale.
 Frame = tuple[list[float], list[float]]
-
 #: Overlap on the way that is still touch, as a share of a typical body: settled parts sink into one another by
 #: thousandths, and hulls carry a margin of 1e-3.
 TOUCH_SHARE = 1e-2

@@ -28,13 +28,8 @@ CONCAVITY = 0.001
 def convex_pieces(name: str, vertices: Array, faces: Numbers) -> list[Array]:
     """Corners of convex pieces that together make up a closed mesh, each float64 (n, 3), in the mesh's frame.
 
-    Args:
-        name: of the part, for messages.
-        vertices: float64 (n, 3).
-        faces: int64 (m, 3).
-
-    Raises:
-        AssemblyError: neither way finds any piece in the mesh.
+    `name`: of the part, for messages. `vertices`: float64 (n, 3). `faces`: int64 (m, 3). Raises AssemblyError: neither
+    way finds any piece in the mesh.
     """
     return cut_into_convex(vertices, faces) or _by_vhacd(name, vertices, faces)
 

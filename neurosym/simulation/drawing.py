@@ -65,7 +65,6 @@ def drawn(
 
 
 Single = NDArray[np.float32]
-
 #: Colour of outlines, and how much of it shows (0..1).
 _INK, _INK_SHARE = np.array([38, 38, 46], dtype=np.float32), 0.75
 #: Colour of the line around parts that are set off, and how wide it is, as a share of the picture's smaller side.
@@ -105,11 +104,8 @@ def cast(shadow_of: Iterable[Array], view: Array, ground: float, size: tuple[int
 
     The corners of all triangles are carried along the light to the ground, drawn, and blurred a little.
 
-    Args:
-        shadow_of: float64 (n, 3, 3) each, triangles in the scene.
-        view: float64 (4, 4), from the scene to the camera's clip space.
-        ground: its height in the scene.
-        size: width and height in pixels.
+    `shadow_of`: float64 (n, 3, 3) each, triangles in the scene. `view`: float64 (4, 4), from the scene to the camera's
+    clip space. `ground`: its height in the scene. `size`: width and height in pixels.
     """
     from PIL import Image, ImageDraw, ImageFilter
 

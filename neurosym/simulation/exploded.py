@@ -105,10 +105,7 @@ def _directions(staging: Staging) -> dict[str, Array]:
 
 
 def _clear(box: Array, placed: Sequence[Array], way: Array, gap: float) -> float:
-    """How far a box (2, 3) must go along a unit vector until it is `gap` away from all others.
-
-    Moved by t, two boxes overlap along an axis for t in an interval, in all while t is in all three: past its end.
-    """
+    """How far a box (2, 3) must go along a unit vector until it is `gap` away from all others."""
     far = 0.0
     for other in placed:
         enter, leave = -np.inf, np.inf

@@ -88,13 +88,9 @@ class FilmSet(Closeable):
     ) -> Pixels:
         """One picture.
 
-        Args:
-            shown: names of the parts that are to be seen.
-            where: part name -> float64 (4, 4), a motion of the world from where the part rests; others rest.
-            marked: names of parts that are set off by a thick line around them.
-
-        Returns:
-            uint8 (height, width, 3).
+        `shown`: names of the parts that are to be seen. `where`: part name -> float64 (4, 4), a motion of the world
+        from where the part rests; others rest. `marked`: names of parts that are set off by a thick line around them.
+        Returns uint8 (height, width, 3).
         """
         moved = {} if where is None else where
         self._place(shown, moved)

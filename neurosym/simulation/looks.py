@@ -47,7 +47,6 @@ class Camera:
 
 #: Free space around what a film shows, as a share of the picture.
 MARGIN = 0.06
-
 #: The four views of the paper: from the top (+y up in the picture), then three sides, from +x, +y and -x, raised a
 #: little. Together they see all but the bottom and the side towards -y.
 VIEWS: tuple[Camera, ...] = (Camera(-90, 90), Camera(0, 15), Camera(90, 15), Camera(180, 15))

@@ -10,7 +10,6 @@ from neurosym.errors import InputError
 BodyKey = tuple[str, int]
 #: Position and quaternion (x, y, z, w) of a body's centre-of-mass frame, in the scene's scale.
 Frame = tuple[tuple[float, ...], tuple[float, ...]]
-
 #: Steps of settling: one second. With a quarter of it 8 verdicts in 100 are wrong, as things fall too slowly.
 SETTLE_STEPS = 240
 #: A part has moved when a corner of it did by more than this share of a typical body. Settling itself shifts

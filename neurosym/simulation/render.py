@@ -152,14 +152,9 @@ def render_many(
 ) -> Pixels:
     """Pictures of many assemblies, in order, the same for any number of workers.
 
-    Args:
-        jobs: pairs of an assembly (or a scene, whose colours are its own) and its seed.
-        style, colours, size, cameras: as in `PictureStudio.views`, for all.
-        workers: processes; 1 stays in this one.
-        progress: called with (done, total).
-
-    Returns:
-        uint8 (len(jobs), n_cameras, size, size, 3).
+    `jobs`: pairs of an assembly (or a scene, whose colours are its own) and its seed. `style, colours, size, cameras`:
+    as in `PictureStudio.views`, for all. `workers`: processes; 1 stays in this one. `progress`: called with (done,
+    total). Returns uint8 (len(jobs), n_cameras, size, size, 3).
     """
     scenes = scenes_of(jobs, colours)
     pictures = np.empty((len(jobs), len(cameras), size, size, 3), dtype=np.uint8)

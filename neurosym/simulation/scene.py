@@ -15,7 +15,6 @@ from neurosym.geometry.staging import Staging
 from neurosym.support.arrays import Array, Numbers
 
 RGB = tuple[float, float, float]
-
 #: Colours of parts in their order, RGB in 0..1: Okabe and Ito's, which people with any colour vision tell apart, black
 #: left out as it hides in the shade. Later parts take them again, lighter, then darker.
 PALETTE: tuple[RGB, ...] = (

@@ -21,7 +21,6 @@ from neurosym.support.arrays import Array, Numbers
 BodiesKind = Literal["parts", "cubes"]
 #: What to do with meshes that are not convex: refuse them, or take them apart into convex pieces.
 MeshesKind = Literal["refuse", "decompose"]
-
 #: A mesh that fills its convex hull to this share is taken as the hull: CAD facets are rarely exactly convex.
 CONVEX_FILL = 1 - 1e-3
 #: The same where meshes may be decomposed: facets of a curved face would give hundreds of pieces, for nothing.
@@ -61,12 +60,9 @@ class Solid:
 class RigidBody:
     """What moves as one: a part, or a single piece of it.
 
-    Attributes:
-        index: which piece of the part, 0 where a part is one body.
-        solids: its convex pieces.
-        mass: in units of the scene: the densest part has density one.
-        X_WC: float64 (4, 4), frame at the centre of mass along the principal axes.
-        inertia: float64 (3,), principal moments in that frame.
+    `index`: which piece of the part, 0 where a part is one body. `solids`: its convex pieces. `mass`: in units of the
+    scene: the densest part has density one. `X_WC`: float64 (4, 4), frame at the centre of mass along the principal
+    axes. `inertia`: float64 (3,), principal moments in that frame.
     """
 
     part: str

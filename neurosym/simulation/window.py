@@ -58,14 +58,9 @@ class Shown:
 class Window(Closeable):
     """A window, until it is closed from either side (a context manager).
 
-    Args:
-        bodies: what there is to see.
-        room: float64 (n, 3), points that are to be in view.
-        camera: from which side; how far away it stands follows from `room`.
-        ground: height of the table; None: there is none.
-
-    Raises:
-        NeurosymError: there is no screen, or no OpenGL.
+    `bodies`: what there is to see. `room`: float64 (n, 3), points that are to be in view. `camera`: from which side;
+    how far away it stands follows from `room`. `ground`: height of the table; None: there is none. Raises
+    NeurosymError: there is no screen, or no OpenGL.
     """
 
     def __init__(self, bodies: Sequence[Shown], room: Array, camera: Camera, ground: float | None) -> None:

@@ -9,7 +9,6 @@ from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
 F = TypeVar("F", bound=Callable[..., Any])
-
 #: Functions of one file, by the file's names; whether each is kept on disk by itself.
 _waiting: dict[int, list[tuple[Callable[..., Any], bool]]] = {}
 _ready: dict[Callable[..., Any], Callable[..., Any]] = {}

@@ -15,12 +15,9 @@ Cells = dict[str, list[tuple[int, int, int]]]
 class Burr:
     """A puzzle of unit cells.
 
-    Attributes:
-        name: what it is called here.
-        layers: the cells, as text.
-        levels: the moves of each separation until all parts are single (BurrTools' 4.1); None: it cannot be done.
-        groups: whether no single part can leave by one straight line, but parts together can.
-        note: what it shows, in a sentence.
+    `name`: what it is called here. `layers`: the cells, as text. `levels`: the moves of each separation until all parts
+    are single (BurrTools' 4.1); None: it cannot be done. `groups`: whether no single part can leave by one straight
+    line, but parts together can. `note`: what it shows, in a sentence.
     """
 
     name: str

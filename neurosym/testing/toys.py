@@ -79,12 +79,9 @@ class Removal:
     ) -> Removal:
         """A structure drawn from `seed`: sometimes solvable, sometimes not, with dead ends.
 
-        Args:
-            seed: of everything.
-            n: parts.
-            blocking: how likely one part stands in another's way, in each of one or two directions.
-            spoiling: how likely the removal of one part makes another's impossible.
-            partial: ask for two of the parts only, so that plans differ in length.
+        `seed`: of everything. `n`: parts. `blocking`: how likely one part stands in another's way, in each of one or
+        two directions. `spoiling`: how likely the removal of one part makes another's impossible. `partial`: ask for
+        two of the parts only, so that plans differ in length.
         """
         rng = np.random.default_rng(seed)
 
@@ -199,11 +196,8 @@ class Tiles:
 class Table:
     """A problem written out: where each action leads from each state. What is not listed is refused.
 
-    Attributes:
-        actions: their names; each is its own class.
-        leads: (state, action) -> state.
-        goal: the state to reach.
-        names: (state, action) -> the actions that its refusal names as evidence, without a promise.
+    `actions`: their names; each is its own class. `leads`: (state, action) -> state. `goal`: the state to reach.
+    `names`: (state, action) -> the actions that its refusal names as evidence, without a promise.
     """
 
     actions: tuple[str, ...]

@@ -21,7 +21,6 @@ from neurosym.viewer.timeline import Timeline
 
 #: Makes a problem of options given by name.
 Maker = Callable[..., Problem]
-
 #: What the library refuses on purpose, or the system does: a message, never a traceback.
 REFUSED = (NeurosymError, OSError, NotImplementedError)
 
@@ -155,10 +154,7 @@ class Exhibit:
 
 
 def _motions(problem: Problem, search: Search) -> tuple[StepMotion | None, ...]:
-    """The motions of a prefix, which a search without a plan does not say: each step is asked for once more.
-
-    Nothing where one is refused: another oracle than geometry may have allowed it.
-    """
+    """The motions of a prefix, which a search without a plan does not say: each step is asked for once more."""
     if search.solved:
         return ()
     grounded, motions = problem.ground(), []

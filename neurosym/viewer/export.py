@@ -18,10 +18,8 @@ from neurosym.viewer.steps import attempts, caption, most_refused, steps
 
 #: Scene updates a second of the recording, and seconds that a step takes.
 RATE, SECONDS_PER_STEP = 15, 1.5
-
 #: Seconds that the film rests at its beginning and its end, which it goes round and round.
 PAUSE = 1.0
-
 #: Width of the panel beside the view (CSS pixels).
 PANEL = 400
 

@@ -23,13 +23,11 @@ from neurosym.viewer.steps import BECAUSE, MOST_REFUSALS, TRIED, attempts, capti
 from neurosym.viewer.timeline import Timeline
 
 _log = logging.getLogger(__name__)
-
 #: Scene updates a second while the film plays, and seconds that a step takes at speed 1.
 RATE, SECONDS_PER_STEP = 30.0, 1.5
 
 SPEEDS = ("0.5×", "1×", "2×", "4×", "8×")
 NO_PART = "(no part)"
-
 #: Width of the panel beside the view (CSS pixels).
 PANEL = 420
 

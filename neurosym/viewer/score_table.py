@@ -11,10 +11,8 @@ from neurosym.viewer.panels import WIDTH, as_data
 
 #: A table of scores with more columns leaves out those that are neither likely at any step nor taken.
 MOST_COLUMNS = 24
-
 #: A table with more rows is drawn as a picture, without numbers and names.
 MOST_ROWS = 40
-
 #: Okabe and Ito's blue for probability, and vermilion for what was taken.
 _INK, _TAKEN = np.array([0, 90, 140]), "#D55E00"
 

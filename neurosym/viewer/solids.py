@@ -11,7 +11,6 @@ from neurosym.support.arrays import Array, Numbers, Truths
 
 #: Edges at which the surface bends by less than this (degrees) are not outlined: facets of something round.
 SHARP = 30.0
-
 #: Corners nearer than this, as a share of the smallest extent of any body, are one.
 SAME = 1e-4
 
@@ -44,10 +43,7 @@ def _solid(assembly: Assembly, part: int) -> Solid:
 
 
 def _merged(vertices: Array, faces: Numbers, of_box: Truths, grid: float) -> tuple[Array, Numbers]:
-    """The same triangles with corners shared, and without the faces of boxes that cover one another.
-
-    `of_box`: bool (m,): which triangles are a box's; those come in pairs, a face each.
-    """
+    """The same triangles with corners shared, and without the faces of boxes that cover one another."""
     _, first, which = np.unique(np.round(vertices / grid), axis=0, return_index=True, return_inverse=True)
     f = which.ravel()[faces]
     sides = f[of_box].reshape(-1, 6)

@@ -16,7 +16,6 @@ from neurosym.viewer.planning import problem_maker
 
 #: The family of assemblies that are files, and the prior that such a one is given where nobody names one.
 ASSEMBLY, UNTRAINED = "assembly", "outermost-first"
-
 #: What a puzzle of the user's own is called on the page.
 PUZZLE = "your puzzle"
 

@@ -21,11 +21,9 @@ from neurosym.support.arrays import Array, Numbers, Pixels, Truths
 
 #: Share of a step's time that the path of the plan takes; the rest is the carrying to or from the place before it.
 ON_PATH = 0.65
-
 #: Space between what is set down (a share of the parts' median width), and between it and the work (a share of the
 #: work's largest extent).
 GAP, CLEAR = 0.35, 0.35
-
 #: Where a part is between two steps: nowhere, in the work, or set down before it.
 ABSENT, IN_PLACE, APART = 0, 1, 2
 

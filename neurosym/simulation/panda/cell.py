@@ -39,14 +39,9 @@ class Load:
 class Cell(Closeable):
     """Table, blocks and arm (a context manager).
 
-    Args:
-        sizes: name of a block -> float64 (3,), its edges.
-        poses: name of a block -> float64 (4, 4), where it lies at first.
-        friction: between any two blocks, and of blocks on the table.
-        colours: name of a block -> RGB in 0..1, for those who watch.
-
-    Attributes:
-        watchers: called with the cell after each time step.
+    `sizes`: name of a block -> float64 (3,), its edges. `poses`: name of a block -> float64 (4, 4), where it lies at
+    first. `friction`: between any two blocks, and of blocks on the table. `colours`: name of a block -> RGB in 0..1,
+    for those who watch. `watchers`: called with the cell after each time step.
     """
 
     def __init__(

@@ -34,11 +34,8 @@ class Failed(Exception):
 class Hand:
     """Moves the arm in the world, after having thought it through in another cell.
 
-    Args:
-        world: where it acts.
-        thought: where it thinks.
-        rng: elbows, and what OMPL draws.
-        force: of each finger when it holds (newtons).
+    `world`: where it acts. `thought`: where it thinks. `rng`: elbows, and what OMPL draws. `force`: of each finger when
+    it holds (newtons).
     """
 
     def __init__(self, world: Cell, thought: Cell, rng: np.random.Generator, force: float) -> None:

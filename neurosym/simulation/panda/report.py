@@ -36,13 +36,9 @@ class BuildSettings:
 class Placement:
     """What became of one block.
 
-    Attributes:
-        block: its name.
-        ok: it stands where it is to stand.
-        reason: one sentence; says what went wrong where something did.
-        attempts: grasps tried.
-        error: how far its centre was from its place when it had been let go (metres); None when it never got there.
-        tilt: how far it was from upright (degrees).
+    `block`: its name. `ok`: it stands where it is to stand. `reason`: one sentence; says what went wrong where
+    something did. `attempts`: grasps tried. `error`: how far its centre was from its place when it had been let go
+    (metres); None when it never got there. `tilt`: how far it was from upright (degrees).
     """
 
     block: str
@@ -57,12 +53,9 @@ class Placement:
 class BuildReport:
     """What the arm did. Truthy exactly when every block stands in its place at the end.
 
-    Attributes:
-        placements: one a block that was tried, in order; after a failure no other is tried.
-        planned: how many blocks the plan has.
-        poses: name -> float64 (4, 4), where every block lies at the end, in the assembly's frame and unit.
-        standing: names of the blocks that stand in their place at the end.
-        seconds: simulated time.
+    `placements`: one a block that was tried, in order; after a failure no other is tried. `planned`: how many blocks
+    the plan has. `poses`: name -> float64 (4, 4), where every block lies at the end, in the assembly's frame and unit.
+    `standing`: names of the blocks that stand in their place at the end. `seconds`: simulated time.
     """
 
     placements: tuple[Placement, ...]
