@@ -1,22 +1,18 @@
 """What stands beside the 3D view, as HTML: the search, pictures, facts about a part. Every name is escaped."""
 
-from __future__ import annotations
-
 import base64
 import io
 import json
 from collections.abc import Mapping, Sequence
 from html import escape
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from PIL import Image
 
 from neurosym.support.arrays import Pixels
+from neurosym.viewer.exhibit import Exhibit
 from neurosym.viewer.facts import PartFacts
-
-if TYPE_CHECKING:
-    from neurosym.viewer.exhibit import Exhibit
-    from neurosym.viewer.planning import Progress
+from neurosym.viewer.planning import Progress
 
 #: Width of pictures (CSS pixels), as wide as the panel beside the view.
 WIDTH = 360

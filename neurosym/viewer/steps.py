@@ -1,17 +1,12 @@
 """The steps of a plan, in a line and as a list, and the attempts of its search, as HTML. Every name is escaped."""
 
-from __future__ import annotations
-
 from collections import Counter
 from html import escape
-from typing import TYPE_CHECKING
 
+from neurosym.geometry.step_motion import StepMotion
+from neurosym.language.search_problem import Rejection
+from neurosym.viewer.exhibit import Exhibit, Search
 from neurosym.viewer.panels import some
-
-if TYPE_CHECKING:
-    from neurosym.geometry.step_motion import StepMotion
-    from neurosym.language.search_problem import Rejection
-    from neurosym.viewer.exhibit import Exhibit, Search
 
 #: While a step of a longer list is under way, so many before it and after it are listed, to keep it in sight.
 BEFORE, AFTER = 6, 20
