@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from neurosym.geometry.assembly import Assembly
-from neurosym.geometry.stability.falls import Fall
+from neurosym.geometry.stability.falls import Fall, find_falls
 from neurosym.language.formulas import Formula, Stands
 from neurosym.language.problem import Problem
 from neurosym.language.terms import Fluent, Literal
@@ -86,8 +86,6 @@ def weighed(
     `instances`: with their ways, gravity left out. `asked`: see `standing_asked`; one at least asks. `refuted`: orders
     of action primitives in which something falls. `seconds`: for the search for falls.
     """
-    from neurosym.geometry.stability.falls import find_falls  # geometry is no part of the language
-
     world, init = problem.geometry, frozenset(problem.init)
     assert world is not None
     first = next(s for s in asked.values() if s)
@@ -144,7 +142,7 @@ def _avert(
         bit = 1 << world.index[part]
         threats = [(k, f) for k, f in enumerate(falls) if not f.moving & bit and (f.gone & bit or not f.gone)]
         ways = []
-        for said, way in instance.ways:
+        for name, way in instance.ways:
             clauses: list[tuple[str, frozenset[Fact]]] = []
             for number, fall in threats:
                 if any(~present(n) in way for n in world.in_mask(fall.moving)):
@@ -156,7 +154,7 @@ def _avert(
                 if number in averted:
                     choices.add(averted[number])
                 clauses.append((f"{number} {instance.name}", frozenset(choices)))
-            ways += [(said, way | conjunction) for conjunction in _multiplied(clauses, kept)]
+            ways += [(name, way | conjunction) for conjunction in _multiplied(clauses, kept)]
         instance.ways = least(ways)
     return kept
 

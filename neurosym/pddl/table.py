@@ -18,10 +18,10 @@ MAX_STATES = 20_000
 
 @dataclass(frozen=True)
 class Table:
-    """Attributes:
-    ways: action primitive -> conjunctions: in a reachable state in which its fluents allow it, the action can be
-        done exactly when one of them holds. Actions that can never be done are left out.
-    states: how many were looked at.
+    """Action primitive -> conjunctions (`ways`), and how many `states` were looked at.
+
+    In a reachable state in which its fluents allow it, the action can be done exactly when one of them holds. Actions
+    that can never be done are left out.
     """
 
     ways: Mapping[str, tuple[frozenset[Literal], ...]]
@@ -77,10 +77,8 @@ def ways_from_table(problem: Problem, seconds: float | None = None) -> Table:
     ways = {}
     for action, good in yes.items():
         bad = rows[[row[s] for s in sorted(no.get(action, ()))]]
-        found = _cover(rows[[row[s] for s in sorted(good)]], bad)
-        ways[ground.actions[action]] = tuple(
-            frozenset(Literal(atoms[c], positive) for c, positive in way) for way in found
-        )
+        cover = _cover(rows[[row[s] for s in sorted(good)]], bad)
+        ways[ground.actions[action]] = tuple(frozenset(Literal(atoms[c], is_so) for c, is_so in way) for way in cover)
     return Table(ways, len(states))
 
 

@@ -39,8 +39,6 @@ class Inspection:
     """What `inspect` found.
 
     Attributes:
-        parts: one entry a part.
-        contacts: one entry a pair that touches.
         free: names of the parts that can leave at once along a straight line, whatever then falls.
         free_along: the same, each with its directions in words.
         interlocked: names of the parts that never come free along straight lines: not alone, or, if groups were asked
@@ -138,9 +136,8 @@ def _parts(world: AssemblyGeometry) -> tuple[PartFacts, ...]:
         faces = sum(len(body.shape.faces) for body in part.bodies)
         low, high = map(tuple, bounds)
         fixed = part.name in world.assembly.fixed
-        facts.append(
-            PartFacts(part.name, float(mass / part.density), float(mass), (low, high), len(part.bodies), faces, fixed)
-        )
+        sizes = float(mass / part.density), float(mass), (low, high), len(part.bodies), faces
+        facts.append(PartFacts(part.name, *sizes, fixed))
     return tuple(facts)
 
 

@@ -93,8 +93,7 @@ class OrderScores:
         member = np.zeros((self.n_actions, len(ids)))
         member[np.arange(self.n_actions), column] = 1.0
         summed = np.log(np.exp(self.log_prob) @ member)
-        costs: Array = np.maximum(-summed, 0.0)[:, column]
-        return costs
+        return np.asarray(np.maximum(-summed, 0.0)[:, column])
 
     def cost(self, step: int, action: int) -> float:
         """-log P(class of `action` at `step`) in nats; beyond the last step, that of the floor."""
@@ -168,5 +167,4 @@ def _normalised(table: Array) -> Array:
     shifted = np.where(np.isfinite(top), table - np.where(np.isfinite(top), top, 0.0), 0.0)
     shifted = shifted - np.log(np.exp(shifted).sum(axis=1, keepdims=True))
     floored = np.maximum(shifted, LOG_FLOOR)
-    result: Array = floored - np.log(np.exp(floored).sum(axis=1, keepdims=True))
-    return result
+    return np.asarray(floored - np.log(np.exp(floored).sum(axis=1, keepdims=True)))

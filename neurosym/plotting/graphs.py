@@ -1,5 +1,6 @@
 """What blocks what along each direction, and what touches what: graphs in layers, or matrices where parts are many."""
 
+import itertools
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -12,6 +13,7 @@ from matplotlib.patches import FancyBboxPatch, Rectangle
 from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.blocking.directions import Directions
 from neurosym.geometry.blocking.graph import BlockingGraph
+from neurosym.geometry.contact.contacts import TABLE, areas_between
 from neurosym.geometry.queries import AssemblyGeometry
 from neurosym.geometry.step_motion import GROUND
 from neurosym.plotting.layers import BOX, Layout, box_width, in_inches, in_layers, write_names
@@ -77,8 +79,6 @@ def contact_figure(assembly: Assembly | AssemblyGeometry, *, title: str = "assem
     Without a ground the layers count from the fixed parts, or from the first one. Of more than `MOST_NODES` parts a
     matrix is drawn, coloured by area.
     """
-    from neurosym.geometry.contact.contacts import TABLE, areas_between  # loads FCL
-
     geometry = AssemblyGeometry.of(assembly)
     assembly = geometry.assembly
     areas = {
@@ -104,9 +104,6 @@ def contact_figure(assembly: Assembly | AssemblyGeometry, *, title: str = "assem
     write_names(axis, places, [*assembly.fixed, GROUND])
     _write_widths(axis, list(areas.values()))
     return figure
-
-
-# -- graphs ---------------------------------------------------------------------------------------------------
 
 
 def _one_way(graph: BlockingGraph) -> list[int]:
@@ -136,13 +133,8 @@ def _layered(graph: nx.DiGraph) -> tuple[list[tuple[str, ...]], Layout, list[tup
         layers[depth[node]] += sorted(whole.nodes[node]["members"])
     arrows = []
     for a, b in nx.transitive_reduction(whole).edges:
-        pairs = [
-            (x, y)
-            for x in sorted(whole.nodes[a]["members"])
-            for y in sorted(whole.nodes[b]["members"])
-            if graph.has_edge(x, y)
-        ]
-        arrows.append(pairs[0])  # of two groups, one arrow says it
+        pairs = itertools.product(*(sorted(whole.nodes[node]["members"]) for node in (a, b)))
+        arrows.append(next(pair for pair in pairs if graph.has_edge(*pair)))  # of two groups, one arrow says it
     framed = [tuple(sorted(whole.nodes[k]["members"])) for k in whole if len(whole.nodes[k]["members"]) > 1]
     return framed, in_layers(layers, arrows, _WIDTH), arrows
 
@@ -157,9 +149,6 @@ def _from(graph: nx.Graph, roots: Sequence[str]) -> list[list[str]]:
         seen |= reached
     rest = [n for n in graph if n not in seen]
     return [layer for layer in (*layers, rest) if layer]
-
-
-# -- drawing --------------------------------------------------------------------------------------------------
 
 
 def _write_title(axis: Axes, title: str) -> None:

@@ -12,6 +12,7 @@ from neurosym.geometry.blocking.graph import BlockingGraph
 from neurosym.geometry.step_motion import GROUND
 from neurosym.plotting.style import COLUMN, SMALL, TITLE, shortened, tidy
 from neurosym.support.arrays import Array
+from neurosym.support.bitsets import bits
 
 #: More rows than this bear no names but numbers, and the size of the names (points).
 MOST_NAMES, _LETTERS = 31, 6
@@ -21,8 +22,6 @@ _MOST_LETTERS = 10
 
 def blocking_matrices(title: str, graph: BlockingGraph, shown: Sequence[int]) -> Figure:
     """A matrix a direction: a row a part, dark where it hits the column's; the free ones come first."""
-    from neurosym.support.bitsets import bits
-
     columns = min(2, len(shown))
     rows = -(-len(shown) // columns)
     figure = Figure(figsize=(COLUMN, 0.8 + rows * (COLUMN - 0.5) / columns), layout="constrained")

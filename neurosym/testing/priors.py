@@ -52,9 +52,8 @@ def check_prior(prior: Prior, problems: Sequence[Problem], *, pictures_only: boo
         try:
             seen = _answers(prior, bare)
         except AttributeError as error:
-            raise ContractError(
-                f"Expected `scores` to read pictures and names only; it also reads more: {error}."
-            ) from None
+            message = f"Expected `scores` to read pictures and names only; it also reads more: {error}."
+            raise ContractError(message) from None
         _check_same("with the same pictures and names, all else taken away", problems, first, seen, BATCH_TOLERANCE)
 
 
@@ -104,16 +103,9 @@ def _check_same(
 
 def _bare(problem: Problem) -> Problem:
     """Only what a picture prior may read."""
-    return cast(
-        "Problem",
-        SimpleNamespace(
-            observation=problem.observation,
-            actions=tuple(problem.actions),
-            classes=tuple(problem.classes),
-            name=problem.name,
-            family=problem.family,
-        ),
-    )
+    kept = {name: getattr(problem, name) for name in ("observation", "name", "family")}
+    bare = SimpleNamespace(actions=tuple(problem.actions), classes=tuple(problem.classes), **kept)
+    return cast("Problem", bare)
 
 
 def _global_generator() -> tuple[Any, ...]:
