@@ -143,9 +143,7 @@ class NetworkPrior(Prior):
             seed: the same seed gives the same weights, on the CPU with the same number of threads.
             epochs: None takes the recipe's; a number is taken as it is.
             device: where to train, and to read afterwards; None is this prior's.
-            progress: called after each epoch.
-            checkpoint: file that keeps the state of the run; see `learned_priors.training.fit`.
-            resume: go on from the checkpoint if it is there.
+            progress, checkpoint, resume: see `learned_priors.training.fit`.
             config: instead of the recipe's `TrainConfig`.
             settings: fields of the `TrainConfig` to change, ``{"epochs": 25, "rate": 4e-3}``; `epochs` goes before.
         """

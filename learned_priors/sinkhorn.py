@@ -89,11 +89,9 @@ def gumbel_sinkhorn(
     """Samples of log S((X + noise * G) / temperature), G independent standard Gumbel (Mena et al. 2018, Sec. 3).
 
     Args:
-        logits: (..., T, N).
         samples: their number; the paper's models use five.
         temperature: tau; towards 0 the samples become permutations.
         noise: factor on the Gumbel noise; 0 makes every sample the same.
-        iterations: column updates, a fixed number.
         generator: source of the noise; None is torch's global one.
 
     Returns:

@@ -27,13 +27,12 @@ class Demonstrations:
         pictures: uint8 (M, V, H, W, 3).
         sequences: int64 (M, T): indices of actions, in order; shorter ones are padded with -1 at the end.
         actions: the N action names.
-        marginals: float32 (M, T, N) or None: soft targets, the share of all valid orders with each action at
-            each step; rows sum to one.
-        groups: int64 (M,): demonstrations of one group show one problem (turned, lit anew) and are held out
-            together; default: each its own.
+        marginals: float32 (M, T, N) or None: soft targets, the share of all valid orders with each action at each step;
+            rows sum to one.
+        groups: int64 (M,): demonstrations of one group show one problem (turned, lit anew) and are held out together;
+            default: each its own.
         domain: the family's name, or "".
-        classes: one integer an action, or empty; actions of one class are interchangeable: swapping two of them
-            leaves the whole problem as it was. Empty: each is its own.
+        classes: one integer an action; those of one class are interchangeable. Empty: each is its own.
     """
 
     pictures: Pixels

@@ -26,13 +26,11 @@ class OrderScores:
     """A prior's answer: how likely each action is at each step.
 
     Attributes:
-        log_prob: float64, shape (n_steps, n_actions). Rows of exp() sum to one. It is copied, refused if it
-            has NaN or +inf, floored at `LOG_FLOOR` and normalised by rows.
+        log_prob: float64, shape (n_steps, n_actions). Rows of exp() sum to one. It is copied, refused if it has NaN or
+            +inf, floored at `LOG_FLOOR` and normalised by rows.
         actions: names of the actions, one a column; may be empty when there are no names.
-        log_length: float64, shape (n_steps + 1,): log-probability that the task takes 0 .. n_steps steps, or
-            None when it takes n_steps for sure.
-        classes: one integer an action; the cost of an action is that of its class (interchangeable actions
-            share their probability). Default: each action is its own class.
+        log_length: float64, shape (n_steps + 1,): log-probability that it takes 0 .. n_steps steps; None: n_steps.
+        classes: one integer an action; interchangeable actions share their probability. Default: each is its own.
     """
 
     log_prob: Array

@@ -28,7 +28,6 @@ class Physics:
         friction: coefficient between any two bodies, and the table; None takes the assembly's.
         gravity: in scene units per second squared, downward along z.
         time_step: seconds. 1/60 changes 6 verdicts in 100.
-        solver_iterations: of Bullet's contact solver, each step.
         clearance: share of its width that an upright box gives up at its sides, so that neighbours side by side
             do not touch. With none, Bullet's solver lets them press on one another, and what should fall may jam.
     """

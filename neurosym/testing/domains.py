@@ -30,12 +30,9 @@ def check_domain(
     """Check a problem family.
 
     Args:
-        domain: its name, or the family.
         problems: which to check in depth; default three of its test part.
-        facts: recompute its known facts.
-        pictures: take pictures and compare them.
-        walks: random walks a problem.
-        seed: of the walks.
+        facts, pictures: whether known facts are recomputed, and pictures taken and compared.
+        walks, seed: random walks a problem.
 
     Raises:
         ContractError: what was expected, and what came.
