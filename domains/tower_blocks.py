@@ -1,10 +1,9 @@
 """Blocks, and the reference towers made of them: the world that the tower domain's predicates are asked about."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -80,7 +79,7 @@ class ReferenceTower:
         levels: Sequence[str],
         offsets: ArrayLike | None = None,
         frame: float | None = None,
-    ) -> ReferenceTower:
+    ) -> Self:
         """A reference tower, checked; without offsets it stands plumb.
 
         Raises AssemblyError: no levels, a name that two blocks bear or two levels take, offsets of another shape;
@@ -151,7 +150,7 @@ class ReferenceTower:
                 raise UnknownNameError("block", name, self.names)
         return _stacked(order, [self.kinds[name][1] for name in order], self.offsets.tolist())
 
-    def anew(self) -> ReferenceTower:
+    def anew(self) -> Self:
         """The same tower with nothing remembered: every question is asked anew."""
         return replace(self, tabulate=False)
 

@@ -1,11 +1,9 @@
 """How well orders read from pictures agree with demonstrated ones: shares for tables, counts for figures."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -91,7 +89,7 @@ class Counts:
     repeats: Numbers
 
     @classmethod
-    def of(cls, predicted: ArrayLike, truth: Demonstrations) -> Counts:
+    def of(cls, predicted: ArrayLike, truth: Demonstrations) -> Self:
         """Count orders, int (M, T), against the demonstrated ones."""
         order, classes = _checked(predicted, truth), classes_of(truth)
         labels = _class_names(truth.actions, classes)
@@ -110,7 +108,7 @@ class Counts:
         return cls(labels, tuple(int(n) for n in np.bincount(classes, minlength=k)), confusion, right, repeats)
 
     @classmethod
-    def pooled(cls, trials: Sequence[Counts]) -> Counts:
+    def pooled(cls, trials: Sequence[Self]) -> Self:
         """Those of several trials, added up."""
         if len({(c.labels, c.members, c.right.shape) for c in trials}) > 1:
             raise InputError("Expected counts of the same classes and steps to add up; got different ones.")
@@ -121,7 +119,7 @@ class Counts:
         return {name: np.asarray(value).tolist() for name, value in vars(self).items()}
 
     @classmethod
-    def from_json(cls, given: Mapping[str, Any]) -> Counts:
+    def from_json(cls, given: Mapping[str, Any]) -> Self:
         arrays = (np.array(given[name], dtype=np.int64) for name in ("confusion", "right", "repeats"))
         return cls(tuple(given["labels"]), tuple(given["members"]), *arrays)
 

@@ -1,11 +1,9 @@
 """What is measured without a planner: the paper's tower and Scrabble experiments, grids of trials with results."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import astuple, dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
 
 import pandas as pd
 
@@ -93,7 +91,7 @@ class Results:
     counts: Mapping[tuple[str, str, int], Counts]
 
     @classmethod
-    def of(cls, study: Study, trials: Mapping[Trial, Mapping[str, Any]]) -> Results:
+    def of(cls, study: Study, trials: Mapping[Trial, Mapping[str, Any]]) -> Self:
         """From what `run_trial` gave for each trial of the study."""
         rows: list[tuple[Any, ...]] = []
         counts: dict[tuple[str, str, int], list[Counts]] = {}

@@ -1,9 +1,8 @@
 """Parts that are taken along a path, or held: by hand, past the others, or by a grip that pulls against them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from math import ceil
+from typing import Self
 
 import numpy as np
 
@@ -21,6 +20,33 @@ TOUCH_SHARE = 1e-2
 PULL_SPEED = 1.0
 #: How hard a grip may pull, in weights of everything there: enough for friction, not for tearing things apart.
 PULL_WEIGHTS = 20.0
+
+
+class Grip:
+    """Holds bodies by constraints: where they are, or where `to` says (a context manager)."""
+
+    def __init__(self, world: World, numbers: Mapping[BodyKey, int]) -> None:
+        self._p = world.p
+        self._constraints: dict[BodyKey, int] = {}
+        self.frames: dict[BodyKey, Frame] = {}
+        for key, number in numbers.items():
+            position, turn = self._p.getBasePositionAndOrientation(number)
+            self.frames[key] = (list(position), list(turn))
+            joint = (self._p.JOINT_FIXED, (0, 0, 0), (0, 0, 0), position, (0, 0, 0, 1), turn)
+            self._constraints[key] = self._p.createConstraint(number, -1, -1, -1, *joint)
+
+    def to(self, frames: Mapping[BodyKey, Frame], force: float) -> None:
+        """Draw each body towards a frame, with at most `force`."""
+        for key, constraint in self._constraints.items():
+            position, turn = frames[key]
+            self._p.changeConstraint(constraint, position, turn, maxForce=force)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for constraint in self._constraints.values():
+            self._p.removeConstraint(constraint)
 
 
 class Carrier:
@@ -127,30 +153,3 @@ def hold(world: World, parts: Sequence[str]) -> Grip:
     grip = Grip(world, numbers)
     grip.to({key: grip.frames[key] for key in numbers}, PULL_WEIGHTS * world.weight)
     return grip
-
-
-class Grip:
-    """Holds bodies by constraints: where they are, or where `to` says (a context manager)."""
-
-    def __init__(self, world: World, numbers: Mapping[BodyKey, int]) -> None:
-        self._p = world.p
-        self._constraints: dict[BodyKey, int] = {}
-        self.frames: dict[BodyKey, Frame] = {}
-        for key, number in numbers.items():
-            position, turn = self._p.getBasePositionAndOrientation(number)
-            self.frames[key] = (list(position), list(turn))
-            joint = (self._p.JOINT_FIXED, (0, 0, 0), (0, 0, 0), position, (0, 0, 0, 1), turn)
-            self._constraints[key] = self._p.createConstraint(number, -1, -1, -1, *joint)
-
-    def to(self, frames: Mapping[BodyKey, Frame], force: float) -> None:
-        """Draw each body towards a frame, with at most `force`."""
-        for key, constraint in self._constraints.items():
-            position, turn = frames[key]
-            self._p.changeConstraint(constraint, position, turn, maxForce=force)
-
-    def __enter__(self) -> Grip:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        for constraint in self._constraints.values():
-            self._p.removeConstraint(constraint)

@@ -4,12 +4,10 @@ The symbols stay those of the grounded problem; each action takes one part away,
 bears it. What has fallen lies where it fell, so under physics a state is the sequence of removals, not their set.
 """
 
-from __future__ import annotations
-
 from collections import OrderedDict
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import Literal, Protocol
+from typing import Literal, Protocol, Self
 
 import numpy as np
 
@@ -121,7 +119,7 @@ class PhysicsOracle(Closeable):
         self._world = World(assembly, bodies=kind, physics=physics, present=present)
 
     @classmethod
-    def of(cls, problem: Problem) -> PhysicsOracle:
+    def of(cls, problem: Problem) -> Self:
         """The oracle of a problem that says how physics would judge it. Raises InputError: it does not."""
         rule = problem.simulation
         if rule is None:

@@ -3,12 +3,10 @@
 Claims (`PlannerTraits`) are compared with brute force; counts with those of an oracle that counts for itself.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -37,7 +35,7 @@ class Toy:
     plans: tuple[tuple[int, ...], ...]
 
     @classmethod
-    def of(cls, name: str, problem: SearchProblem[Any]) -> Toy:
+    def of(cls, name: str, problem: SearchProblem[Any]) -> Self:
         return cls(name, problem, tuple(brute_force_plans(problem)))
 
     @property

@@ -3,11 +3,9 @@
 They satisfy `SearchProblem`. `brute_force_plans` finds all their plans, and shares no code with any planner.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -76,7 +74,7 @@ class Removal:
     @classmethod
     def random(
         cls, seed: int, n: int = 5, *, blocking: float = 0.25, spoiling: float = 0.06, partial: bool = False
-    ) -> Removal:
+    ) -> Self:
         """A structure drawn from `seed`: sometimes solvable, sometimes not, with dead ends.
 
         `seed`: of everything. `n`: parts. `blocking`: how likely one part stands in another's way, in each of one or
@@ -95,7 +93,7 @@ class Removal:
         return cls(blockers, spoilers, needs, sum(1 << int(p) for p in wanted), promises=bool(rng.random() < 0.7))
 
     @classmethod
-    def loose(cls, n: int) -> Removal:
+    def loose(cls, n: int) -> Self:
         """Nothing stands in the way of anything: every order is a plan."""
         return cls(((0,),) * n, (0,) * n, (0,) * n, (1 << n) - 1)
 
@@ -207,7 +205,7 @@ class Table:
     initial: str = "start"
 
     @classmethod
-    def crossing(cls) -> Table:
+    def crossing(cls) -> Self:
         """Two ways lead to one state, and only one of them leaves the action that is needed there."""
         return cls(("a", "b"), {("start", "a"): "middle", ("start", "b"): "middle", ("middle", "a"): "end"}, "end")
 

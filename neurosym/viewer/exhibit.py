@@ -1,10 +1,8 @@
 """What the page asks for and what it shows: no server, no browser."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Self
 
 from neurosym.errors import NeurosymError
 from neurosym.geometry.step_motion import StepMotion
@@ -68,7 +66,7 @@ class Search:
         return self.status is Status.SOLVED
 
     @classmethod
-    def of(cls, result: PlanResult, query: Query, scores: OrderScores | None, *, stopped: bool = False) -> Search:
+    def of(cls, result: PlanResult, query: Query, scores: OrderScores | None, *, stopped: bool = False) -> Self:
         """What a planner answered to a query."""
         counts = {name: getattr(result, name) for name in COUNTS}
         if result.cost is not None:
@@ -84,7 +82,7 @@ class Search:
         return cls(steps, motions, result.status, sentence, result.blame, counts, settings, scores, why_not, undone)
 
     @classmethod
-    def saved(cls, saved: SavedPlan, scores: OrderScores | None) -> Search:
+    def saved(cls, saved: SavedPlan, scores: OrderScores | None) -> Self:
         """What a plan's file says of it. A plan that does not hold, by geometry asked anew, is none.
 
         Plans that a simulation allowed are left to it (`neurosym replay`). Raises InputError: the file's account of the
@@ -128,7 +126,7 @@ class Exhibit:
         return tuple(name for name in self.timeline.names if name not in missing)
 
     @classmethod
-    def of(cls, problem: Problem, search: Search, notes: tuple[str, ...] = ()) -> Exhibit:
+    def of(cls, problem: Problem, search: Search, notes: tuple[str, ...] = ()) -> Self:
         """Stage the film and take the pictures, as far as the problem has them."""
         timeline, pictures = None, None
         try:
@@ -143,7 +141,7 @@ class Exhibit:
         return cls(problem, search, timeline, pictures, notes)
 
     @classmethod
-    def saved(cls, saved: SavedPlan) -> Exhibit:
+    def saved(cls, saved: SavedPlan) -> Self:
         """A plan from a file. Its prior is asked again; where that fails, a note says so."""
         scores, notes = None, []
         try:
