@@ -838,7 +838,6 @@ def test_the_model_loads_no_viser():
         "solids",
         "panels",
         "steps",
-        "follow",
         "score_table",
         "planning",
         "sources",
