@@ -1,5 +1,7 @@
 """Nogoods: what rejections promise, so that it need not be asked again."""
 
+from __future__ import annotations
+
 from collections.abc import Iterable
 
 from neurosym.language.search_problem import Rejection

@@ -1,5 +1,7 @@
 """What one search knows, whatever its algorithm: answers, nogoods, preferred actions, budget and log."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any

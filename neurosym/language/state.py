@@ -1,5 +1,7 @@
 """What a derived predicate may ask of a state."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Protocol
 

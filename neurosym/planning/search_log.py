@@ -1,5 +1,7 @@
 """The log that every planner keeps while it searches, so that planners are compared in one unit."""
 
+from __future__ import annotations
+
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, field, replace
 from time import perf_counter

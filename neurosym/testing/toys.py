@@ -3,6 +3,8 @@
 They satisfy `SearchProblem`. `brute_force_plans` finds all their plans, and shares no code with any planner.
 """
 
+from __future__ import annotations
+
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Self
