@@ -1,7 +1,5 @@
 """Small assemblies of cells, with what is to be learned from each: the numbered problems of the domain "assembly"."""
 
-from __future__ import annotations
-
 from itertools import product
 
 from neurosym.errors import InputError

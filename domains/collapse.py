@@ -12,14 +12,13 @@ b, moved down, would hit a. Falling keeps every column's order and leaves no gap
 left decides where every cube lies.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, reduce
 from itertools import combinations
+from operator import or_
 
+import networkx as nx
 import numpy as np
-from numpy.typing import NDArray
 
 from neurosym.errors import AssemblyError
 from neurosym.geometry.assembly import Assembly
@@ -32,13 +31,12 @@ from neurosym.geometry.shapes import Box
 from neurosym.language import Derived, Fluent, State
 from neurosym.language.formulas import AnyOf, Way
 from neurosym.language.search_problem import Verdict
+from neurosym.support.arrays import Array
 from neurosym.support.bitsets import bits
 
 RULES = ("cubes", "strict", "rigid")
-
 #: Moving cubes that are still no collapse (the paper: "any", by its code more than one).
 MAY_MOVE = {"cubes": 1, "strict": 0}
-
 #: How far cubes over one another may be out of line, as a share of their edge.
 SQUARELY = 0.01
 
@@ -49,10 +47,8 @@ _DOWN = ((0.0, 0.0, -1.0),)
 class Stacks:
     """Which cubes stand over which, as bitsets.
 
-    Attributes:
-        own: one bitset of cubes a piece: its own.
-        over: one bitset of cubes a piece: all cubes of other pieces over any of its own.
-        owner: the number of the piece of each cube.
+    `own`: one bitset of cubes a piece: its own. `over`: one bitset of cubes a piece: all cubes of other pieces over any
+    of its own. `owner`: the number of the piece of each cube.
     """
 
     own: tuple[int, ...]
@@ -62,13 +58,9 @@ class Stacks:
 
     def cubes_of(self, pieces: int) -> int:
         """All cubes of the pieces in a bitset; each set is gathered once."""
-        cubes = self._cubes.get(pieces)
-        if cubes is None:
-            cubes = 0
-            for piece in bits(pieces):
-                cubes |= self.own[piece]
-            self._cubes[pieces] = cubes
-        return cubes
+        if pieces not in self._cubes:
+            self._cubes[pieces] = reduce(or_, (self.own[piece] for piece in bits(pieces)), 0)
+        return self._cubes[pieces]
 
 
 def stacks_of(world: AssemblyGeometry) -> Stacks:
@@ -144,7 +136,7 @@ def _settled(world: Assembly, there: int) -> dict[int, float]:
     """Heights (z of the centre) at which the cubes of the pieces in `there` come to rest, lowest first."""
     edge = world.smallest_extent
     cubes = [int(c) for c in np.argsort(world.X_WB[:, 2, 3], kind="stable") if there >> int(world.owners[c]) & 1]
-    poses: dict[int, NDArray[np.float64]] = {}
+    poses: dict[int, Array] = {}
     for cube in cubes:
         pose = world.X_WB[cube].copy()
         under = [poses[c] for c in poses if drops_onto(world, cube, c, poses[c])]
@@ -194,25 +186,17 @@ def check_standing(geometry: AssemblyGeometry, rule: str) -> None:
                 )
         return
     # Whoever stands on the table, then whoever stands on those, and so on.
-    carriers: dict[int, set[int]] = {}
+    carries = nx.DiGraph()
+    carries.add_node(TABLE)
     for contact in geometry.contacts:
         a, b = int(world.owners[contact.a]), TABLE if contact.b == TABLE else int(world.owners[contact.b])
-        if contact.normal[2] < -0.7:
-            carriers.setdefault(b, set()).add(a)
-        elif contact.normal[2] > 0.7:
-            carriers.setdefault(a, set()).add(b)
-    held, waiting = {TABLE}, [TABLE]
-    while waiting:
-        for carried in carriers.get(waiting.pop(), set()) - held:
-            if present >> carried & 1:
-                held.add(carried)
-                waiting.append(carried)
-    for number in bits(present):
-        if number not in held:
-            raise AssemblyError(
-                f"Piece {world.names[number]!r} is floating: nothing that it stands on reaches the table (z is up, the "
-                f"table is at z = {world.ground:g}). Move it down, or leave it out."
-            )
+        if abs(contact.normal[2]) > 0.7:
+            carries.add_edge(*((b, a) if contact.normal[2] < 0 else (a, b)))
+    if floating := set(range(len(geometry))) - nx.descendants(carries, TABLE):
+        raise AssemblyError(
+            f"Piece {world.names[min(floating)]!r} is floating: nothing that it stands on reaches the table (z is up, "
+            f"the table is at z = {world.ground:g}). Move it down, or leave it out."
+        )
     if rule == "rigid":
         standing = geometry.stability.standing(present)
         if not standing.stands:

@@ -5,29 +5,33 @@ Each tile is an action primitive, used at most once; a letter that is needed twi
 letters are interchangeable. Words are far shorter than the set: 3 to 6 steps of 98 actions.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections import Counter
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from domains import scrabble_tiles
 from domains.scrabble_demonstrations import demonstrate, picture_seed
 from domains.scrabble_rules import DOMAIN, Reference, all_slots_filled, laid, tile
 from domains.scrabble_tiles import COUNTS, LONGEST, N_TEST, N_TRAIN, SHORTEST, TILES, VALUES
 from neurosym.errors import InputError, UnknownNameError
-from neurosym.geometry.staging import Staging
+from neurosym.geometry.assembly import Assembly
+from neurosym.geometry.rigid_motions import shifted
+from neurosym.geometry.shapes import boxes_part
+from neurosym.geometry.staging import Staging, building
 from neurosym.geometry.step_motion import StepMotion
 from neurosym.language import Atom, Problem
 from neurosym.language.demonstrations import Demonstrations
 from neurosym.language.problem_family import ProblemFamily, Progress
+from neurosym.support.arrays import Pixels
 
 #: How many problems of a part are meant where nobody says how many: enough for `compare`, and for its blind baseline.
 DEFAULT_COUNTS = {"train": 50, "test": 200}
+#: A tile: its edges, and from the middle of one slot to that of the next (edges of a tile); wood, RGB in 0..1.
+SIZE, PITCH, WOOD = (1.0, 1.0, 0.22), 1.04, (0.87, 0.72, 0.50)
 
 
 class ScrabbleFamily(ProblemFamily):
@@ -56,15 +60,8 @@ class ScrabbleFamily(ProblemFamily):
             pictures: style of the observation, ``"easy"`` or ``"hard"`` (also ``"clean"`` and ``"varied"``).
             seed: of the pictures.
         """
-        word = self.word(number, tiles=tiles, words=words)
-        return self.problem_from_word(
-            word,
-            tiles=tiles,
-            start=start,
-            pictures=pictures,
-            seed=picture_seed(seed, int(number)),
-            name=f"scrabble-{number}",
-        )
+        word, own, name = self.word(number, tiles=tiles, words=words), picture_seed(seed, number), f"scrabble-{number}"
+        return self.problem_from_word(word, tiles=tiles, start=start, pictures=pictures, seed=own, name=name)
 
     def word(self, number: int, *, tiles: int = len(TILES), words: Sequence[str] | None = None) -> str:
         """The letters of a problem, without the problem."""
@@ -84,23 +81,19 @@ class ScrabbleFamily(ProblemFamily):
     ) -> Problem:
         """Any word of 3 to 6 letters that the first `tiles` tiles can lay.
 
-        Raises:
-            InputError: the word cannot be laid, or does not begin with the tiles that lie already.
+        Raises InputError: the word cannot be laid, or does not begin with the tiles that lie already.
         """
         from domains.scrabble_drawing import style_named
 
-        names = scrabble_tiles.first_tiles(tiles)
-        letters = scrabble_tiles.checked_word(word, tiles)
-        style = style_named(pictures)
-        first = tuple(start)
+        names, letters = scrabble_tiles.first_tiles(tiles), scrabble_tiles.checked_word(word, tiles)
+        style, first = style_named(pictures), tuple(start)
         init = _initial(letters, first, names)
-
         return DOMAIN.problem(
             world=Reference(letters, names, len(init)),
             objects={tile: names},
             init=init,
             goal=[all_slots_filled()],
-            interchangeable=_by_letter(names),
+            interchangeable=[tuple(name for name in names if name[0] == letter) for letter in COUNTS],
             name=name or letters,
             family=self.name,
             details={"word": letters, "tiles": len(names), "pictures": style.name, "seed": seed, "start": first},
@@ -128,20 +121,19 @@ class ScrabbleFamily(ProblemFamily):
         """The first `count` problems of a part (default: see `numbers`), with the options of `problem`."""
         return [self.problem(n, **options) for n in self.numbers(part, split=split, count=count)]
 
-    def observe(self, problem: Problem) -> NDArray[np.uint8]:
-        from domains.scrabble_drawing import draw_word, style_named
-
-        details = problem.details
-        return draw_word(details["word"], style_named(details["pictures"]), np.random.default_rng(details["seed"]))
-
     def staging(self, problem: Problem, plan: Sequence[str], motions: Sequence[StepMotion | None]) -> Staging:
-        from domains.scrabble_staging import laid_out
+        """Tiles flat on a table, side by side in their slots, each laid from above."""
+        from domains.scrabble_drawing import tile_face
 
-        return laid_out(problem.details["start"], plan)
+        names, parts = (*problem.details["start"], *plan), []
+        for slot, name in enumerate(names):
+            at = shifted((PITCH * slot, 0.0, SIZE[2] / 2))
+            parts.append(boxes_part(name, np.zeros((1, 3)), np.array(SIZE), at))
+        work = Assembly(tuple(parts), table=0.0)
+        staging = building(work, problem.details["start"], plan, dict.fromkeys(names, WOOD))
+        return replace(staging, tops={name: tile_face(name[0]) for name in names})
 
-    def pictures(
-        self, problem: Problem, *, style: str = "easy", rng: np.random.Generator | None = None
-    ) -> NDArray[np.uint8]:
+    def pictures(self, problem: Problem, *, style: str = "easy", rng: np.random.Generator | None = None) -> Pixels:
         """One view of the word, uint8 (1, 32, 192, 3)."""
         from domains.scrabble_drawing import draw_word, style_named
 
@@ -149,7 +141,7 @@ class ScrabbleFamily(ProblemFamily):
 
     def take_pictures(
         self, problems: Sequence[Problem], *, style: str, workers: int = 1, progress: Progress | None = None
-    ) -> NDArray[np.uint8]:
+    ) -> Pixels:
         """Pictures of many problems, from disk where they were taken before."""
         from domains.scrabble_pictures import cached_pictures
 
@@ -192,8 +184,8 @@ class ScrabbleFamily(ProblemFamily):
         }
 
     def _counts(self) -> str:
-        found = Counter(name[0] for name in self.problem(0).actions)
-        return " ".join(f"{letter}={found[letter]}" for letter in sorted(found))
+        counts = sorted(Counter(name[0] for name in self.problem(0).actions).items())
+        return " ".join(f"{letter}={count}" for letter, count in counts)
 
 
 #: As the paper's appendix prints them.
@@ -205,11 +197,6 @@ _PUBLISHED_COUNTS = (
 def _sequences_of_six() -> int:
     lengths = range(SHORTEST, LONGEST + 1)
     return len({p for length in lengths for p in itertools.permutations([t[0] for t in TILES[:6]], length)})
-
-
-def _by_letter(names: Sequence[str]) -> list[tuple[str, ...]]:
-    """Groups of tiles that bear one letter: they may be swapped for one another."""
-    return [tuple(name for name in names if name[0] == letter) for letter in COUNTS]
 
 
 def _initial(word: str, start: tuple[str, ...], names: tuple[str, ...]) -> list[Atom]:

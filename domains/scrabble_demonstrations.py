@@ -7,8 +7,6 @@ Sequences have 6 steps, -1 after the word's end, and groups hold what shows one 
            same for all the tiles of the step's letter.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np
@@ -18,6 +16,7 @@ from domains.scrabble_tiles import COUNTS, LONGEST
 from neurosym.errors import UnknownNameError
 from neurosym.language.demonstrations import Demonstrations
 from neurosym.language.problem_family import Progress
+from neurosym.support.arrays import Numbers
 
 RECIPES = ("full", "paper")
 
@@ -57,7 +56,7 @@ def demonstrate(
     )
 
 
-def _demonstrated(word: str, names: Sequence[str], seed: Sequence[int]) -> NDArray[np.int64]:
+def _demonstrated(word: str, names: Sequence[str], seed: Sequence[int]) -> Numbers:
     """int64 (6,): for each letter one of its tiles, drawn at random, none twice; -1 after the end."""
     order = [int(a) for a in np.random.default_rng(seed).permutation(len(names))]
     sequence = np.full(LONGEST, -1, dtype=np.int64)

@@ -9,8 +9,6 @@ Every letter is drawn once, large, on a few cuts of wood; a picture then only be
           too, on tables of any colour; light from dim to bright, tinted, falling off to one side; noise and blur.
 """
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,9 +19,9 @@ from PIL import Image, ImageDraw, ImageFilter, ImageFont
 
 from domains.scrabble_tiles import VALUES
 from neurosym.errors import UnknownNameError
+from neurosym.support.arrays import Array, Pixels
 
 HEIGHT, WIDTH = 32, 192
-
 #: Pictures are drawn so many times larger, then halved: edges are smooth.
 _FINE = 2
 #: Side of a tile and of the square around it, with room for its shadow, in pixels of the large drawing.
@@ -80,7 +78,7 @@ def style_named(style: str) -> Style:
     return STYLES[style]
 
 
-def draw_word(word: str, style: Style, rng: np.random.Generator) -> NDArray[np.uint8]:
+def draw_word(word: str, style: Style, rng: np.random.Generator) -> Pixels:
     """One picture, uint8 (1, 32, 192, 3), of a word of at most 6 letters."""
     n = len(word)
     canvas = Image.new("RGBA", (WIDTH * _FINE, HEIGHT * _FINE), _table(style, rng))
@@ -102,7 +100,7 @@ def _table(style: Style, rng: np.random.Generator) -> tuple[int, int, int, int]:
     return int(r), int(g), int(b), 255
 
 
-def _bends(centres: NDArray[np.float64], style: Style, rng: np.random.Generator) -> NDArray[np.float64]:
+def _bends(centres: Array, style: Style, rng: np.random.Generator) -> Array:
     """float64 (n, 3, 3): from the square around each tile to the large drawing, as homographies."""
     n = len(centres)
     angle = np.radians(rng.uniform(-style.turn, style.turn, n))
@@ -119,11 +117,11 @@ def _bends(centres: NDArray[np.float64], style: Style, rng: np.random.Generator)
     camera[2, :2] = rng.uniform(-style.yaw, style.yaw) / WIDTH * 2, rng.uniform(-style.pitch, style.pitch) / HEIGHT * 2
     outer = np.array([[_FINE, 0, WIDTH * _FINE / 2], [0, _FINE, HEIGHT * _FINE / 2], [0, 0, 1.0]])
     centred = np.array([[1, 0, -_SQUARE / 2], [0, 1, -_SQUARE / 2], [0, 0, 1.0]])
-    bends: NDArray[np.float64] = outer @ camera @ place @ centred
+    bends: Array = outer @ camera @ place @ centred
     return bends
 
 
-def _lay(canvas: Image.Image, tiles: Sequence[Image.Image], bends: NDArray[np.float64]) -> None:
+def _lay(canvas: Image.Image, tiles: Sequence[Image.Image], bends: Array) -> None:
     """Put tiles on the canvas, each bent by its homography."""
     corners = bends @ (np.array([[0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1.0]]) * (_SQUARE, _SQUARE, 1)).T
     seen = corners[:, :2] / corners[:, 2:]
@@ -141,7 +139,7 @@ def _lay(canvas: Image.Image, tiles: Sequence[Image.Image], bends: NDArray[np.fl
             canvas.alpha_composite(bent.convert("RGBA"), (left, top))
 
 
-def _lit(picture: NDArray[np.float32], style: Style, rng: np.random.Generator) -> NDArray[np.uint8]:
+def _lit(picture: NDArray[np.float32], style: Style, rng: np.random.Generator) -> Pixels:
     """Brightness, its fall along the row, tint and noise; uint8 (32, 192, 3)."""
     bright, fall = rng.uniform(-style.light, style.light, 2) * (1, 0.5)
     along = (1 + bright + fall * np.linspace(-1, 1, WIDTH)).astype(np.float32)
@@ -169,9 +167,9 @@ def _tile(letter: str, cut: int) -> Image.Image:
     return tile.convert("RGBa")
 
 
-def tile_face(letter: str) -> NDArray[np.uint8]:
+def tile_face(letter: str) -> Pixels:
     """What the top of a tile looks like, uint8 (54, 54, 3)."""
-    face: NDArray[np.uint8] = np.asarray(_face(letter, 0).convert("RGB"))
+    face: Pixels = np.asarray(_face(letter, 0).convert("RGB"))
     return face
 
 
@@ -189,7 +187,7 @@ def _face(letter: str, cut: int) -> Image.Image:
     return face
 
 
-def _wood(rng: np.random.Generator) -> NDArray[np.uint8]:
+def _wood(rng: np.random.Generator) -> Pixels:
     """uint8 (54, 54, 3): grain runs across, in waves that are stretched along it."""
     y, x = np.mgrid[0:_TILE, 0:_TILE] / _TILE
     along = y + 0.06 * np.sin(2 * np.pi * (x * rng.uniform(0.3, 0.8) + rng.random()))
@@ -198,7 +196,7 @@ def _wood(rng: np.random.Generator) -> NDArray[np.uint8]:
         grain += strength * np.sin(2 * np.pi * (waves * rng.uniform(0.7, 1.3) * along + rng.random()))
     grain += np.repeat(rng.normal(0, 3, (_TILE, 1)), _TILE, axis=1)
     base = np.array([222, 184, 128]) + rng.uniform(-14, 14) * np.array([1, 1, 0.8])
-    wood: NDArray[np.uint8] = np.clip(base + grain[..., None] * np.array([1, 0.9, 0.7]), 0, 255).astype(np.uint8)
+    wood: Pixels = np.clip(base + grain[..., None] * np.array([1, 0.9, 0.7]), 0, 255).astype(np.uint8)
     return wood
 
 

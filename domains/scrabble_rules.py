@@ -4,8 +4,6 @@ Tiles are laid left to right, so how many lie there says which slot is next, and
 are the N action primitives.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from neurosym.language import Action, Atom, Domain, Fluent, Type
@@ -21,10 +19,8 @@ laid = Fluent("laid", tile)
 class Reference:
     """The word to lay, and what to lay it with.
 
-    Attributes:
-        word: its letters; slot i takes ``word[i]``.
-        tiles: names of the tiles, a letter and an instance.
-        start: how many slots are filled when the problem begins.
+    `word`: its letters; slot i takes ``word[i]``. `tiles`: names of the tiles, a letter and an instance. `start`: how
+    many slots are filled when the problem begins.
     """
 
     word: str
@@ -69,7 +65,5 @@ def all_slots_filled(world: Reference, state: State) -> Verdict:
 
 _t = tile("t")
 DOMAIN = Domain(
-    "scrabble",
-    fluents=[laid],
-    actions=[Action("lay", _t, pre=[~laid(_t), matches(_t)], eff=[laid(_t)], label="{t}")],
+    "scrabble", fluents=[laid], actions=[Action("lay", _t, pre=[~laid(_t), matches(_t)], eff=[laid(_t)], label="{t}")]
 )

@@ -4,8 +4,6 @@ Words are random combinations of tiles, as in Burke, Subr, Ramamoorthy (RA-L 202
 from a list that the user gives. Which word a number stands for depends on nothing but the number.
 """
 
-from __future__ import annotations
-
 import functools
 import hashlib
 from collections import Counter
@@ -15,30 +13,21 @@ import numpy as np
 
 from neurosym.errors import InputError
 
+
+def _each(letters_of: dict[int, str]) -> dict[str, int]:
+    return dict(sorted((letter, number) for number, letters in letters_of.items() for letter in letters))
+
+
 #: How often each letter comes in the standard English set, the two blanks left out.
-_COUNTS = {
-    letter: count
-    for count, letters in {1: "jkqxz", 2: "bcfhmpvwy", 3: "g", 4: "dlsu", 6: "nrt", 8: "o", 9: "ai", 12: "e"}.items()
-    for letter in letters
-}
-COUNTS = dict(sorted(_COUNTS.items()))
-
+COUNTS = _each({1: "jkqxz", 2: "bcfhmpvwy", 3: "g", 4: "dlsu", 6: "nrt", 8: "o", 9: "ai", 12: "e"})
 #: What a tile is worth; printed on it.
-VALUES = {
-    letter: value
-    for value, letters in {1: "aeilnorstu", 2: "dg", 3: "bcmp", 4: "fhvwy", 5: "k", 8: "jx", 10: "qz"}.items()
-    for letter in letters
-}
-
+VALUES = _each({1: "aeilnorstu", 2: "dg", 3: "bcmp", 4: "fhvwy", 5: "k", 8: "jx", 10: "qz"})
 #: Tiles in a word.
 SHORTEST, LONGEST = 3, 6
-
 #: Random problems of one split; the numbers of split s begin at s * (N_TRAIN + N_TEST), the training ones first.
 N_TRAIN, N_TEST = 10_000, 5_000
-
 #: One letter sequence in so many belongs to the test part.
 _TEST_SHARE = 3
-
 #: Kept apart from any user's seed.
 _WORD_STREAM, _LIST_STREAM = 0x5C_4A, 0x5C_4B
 
@@ -61,11 +50,7 @@ def first_tiles(n: int) -> tuple[str, ...]:
 
 
 def checked_word(word: str, n: int) -> str:
-    """The word in small letters.
-
-    Raises:
-        InputError: it cannot be laid from the first `n` tiles; says why.
-    """
+    """The word in small letters. Raises InputError: it cannot be laid from the first `n` tiles; says why."""
     found = word.lower() if isinstance(word, str) else ""
     if not found or set(found) - set(COUNTS):
         raise InputError(f"Expected a word of the letters a to z; got {word!r}.")

@@ -4,13 +4,10 @@ Source: Burke, Subr, Ramamoorthy, "Action sequencing using visual permutations" 
 Table II. The rules of collapse are in `domains.collapse`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from domains.collapse import RULES, check_cubes, check_overlaps, check_standing, keeps_standing
 from domains.soma_demonstrations import check_seed, demonstrate, picture_seed
@@ -22,6 +19,7 @@ from neurosym.language import Action, Domain, Fluent, Problem, Simulation, Type,
 from neurosym.language.demonstrations import Demonstrations
 from neurosym.language.problem import as_names
 from neurosym.language.problem_family import ProblemFamily, Progress
+from neurosym.support.arrays import Pixels
 
 piece = Type("piece")
 present = Fluent("present", piece)
@@ -29,11 +27,8 @@ _p = piece("p")
 
 
 def _take_apart(rule: str) -> Domain:
-    geometry = (
-        [predicates.free(present)(_p), predicates.stable_without(present)(_p)]
-        if rule == "rigid"
-        else [keeps_standing(present, rule)(_p)]
-    )
+    asked = [predicates.free(present), predicates.stable_without(present)]
+    geometry = [predicate(_p) for predicate in (asked if rule == "rigid" else [keeps_standing(present, rule)])]
     remove = Action("remove", _p, pre=[present(_p), *geometry], eff=[~present(_p)], label="{p}")
     return Domain(f"soma-{rule}", fluents=[present], actions=[remove])
 
@@ -57,20 +52,13 @@ class SomaFamily(ProblemFamily):
     name = "soma"
     reference = "Burke, Subr, Ramamoorthy (RA-L 2021), Sec. IV-D, Table II; Berlekamp, Conway, Guy, Winning Ways"
     domain = DOMAINS["cubes"]
-    published: ClassVar[Sequence[Mapping[str, Any]]] = (
-        {"planner": "swap-repair", "prior": "random", "initial_failures": None, "iterations": (5.35, 4.12)},
-        {
-            "planner": "swap-repair",
-            "prior": "tcn-paper",
-            "initial_failures": (54.95, 10.99),
-            "iterations": (1.90, 3.25),
-        },
-        {
-            "planner": "swap-repair",
-            "prior": "sinkhorn-paper",
-            "initial_failures": (51.55, 6.19),
-            "iterations": (1.75, 3.19),
-        },
+    published: ClassVar[Sequence[Mapping[str, Any]]] = tuple(
+        {"planner": "swap-repair", "prior": prior, "initial_failures": failures, "iterations": iterations}
+        for prior, failures, iterations in (
+            ("random", None, (5.35, 4.12)),
+            ("tcn-paper", (54.95, 10.99), (1.90, 3.25)),
+            ("sinkhorn-paper", (51.55, 6.19), (1.75, 3.19)),
+        )
     )
     #: Rules of collapse, for the command line.
     collapses = RULES
@@ -124,8 +112,7 @@ class SomaFamily(ProblemFamily):
     ) -> Problem:
         """Any polycube puzzle, its pieces given as {name: [(x, y, z), ...]}, z up; options as for `problem`.
 
-        Raises:
-            AssemblyError: pieces that overlap, repeat a cell, are not connected, float or are empty.
+        Raises AssemblyError: pieces that overlap, repeat a cell, are not connected, float or are empty.
         """
         if not isinstance(cells, Mapping) or not cells:
             raise AssemblyError(f"Expected pieces as {{name: [(x, y, z), ...]}}, at least one; got {cells!r}.")
@@ -198,21 +185,17 @@ class SomaFamily(ProblemFamily):
         """The cubes of a part, with the options of `problem`."""
         return [self.problem(n, **options) for n in self.numbers(part, split=split)]
 
-    def observe(self, problem: Problem) -> NDArray[np.uint8]:
-        rng = np.random.default_rng(problem.details["seed"])
-        return render_views(problem.world, problem.details["pictures"], rng)
-
-    def pictures(
-        self, problem: Problem, *, style: str = "clean", rng: np.random.Generator | None = None
-    ) -> NDArray[np.uint8]:
+    def pictures(self, problem: Problem, *, style: str = "clean", rng: np.random.Generator | None = None) -> Pixels:
         """Four views, top and three sides: uint8 (4, 64, 64, 3)."""
-        return render_views(problem.world, style, rng or np.random.default_rng(0))
+        from neurosym.simulation.render import render_views  # loads PyBullet
+
+        return render_views(problem.world, style=style, rng=rng or np.random.default_rng(0))
 
     def take_pictures(
         self, problems: Sequence[Problem], *, style: str, workers: int = 1, progress: Progress | None = None
-    ) -> NDArray[np.uint8]:
+    ) -> Pixels:
         """Pictures of many problems, from disk where they were taken before."""
-        from neurosym.simulation.picture_cache import cached_pictures
+        from neurosym.simulation.render import cached_pictures
 
         jobs = [(p.world, p.details["seed"]) for p in problems]
         return cached_pictures(jobs, style=style, workers=workers, progress=progress)
@@ -246,24 +229,14 @@ class SomaFamily(ProblemFamily):
         return sum(counts), min(counts), max(counts)
 
 
-def render_views(assembly: Assembly, style: str, rng: np.random.Generator) -> NDArray[np.uint8]:
-    """Top and three sides, uint8 (4, 64, 64, 3)."""
-    from neurosym.simulation import render  # loads PyBullet
-
-    views: NDArray[np.uint8] = render.render_views(assembly, style=style, rng=rng)
-    return views
-
-
 def _check_connected(name: str, cells: Sequence[tuple[int, ...]]) -> None:
     left = {tuple(map(int, c)) for c in cells}
     reached = [left.pop()]
     while reached:
         x, y, z = reached.pop()
         steps = ((x + 1, y, z), (x - 1, y, z), (x, y + 1, z), (x, y - 1, z), (x, y, z + 1), (x, y, z - 1))
-        for neighbour in steps:
-            if neighbour in left:
-                left.remove(neighbour)
-                reached.append(neighbour)
+        reached += left.intersection(steps)
+        left.difference_update(steps)
     if left:
         raise AssemblyError(
             f"Piece {name!r}: expected cells that hang together face to face; {sorted(left)} are apart from the rest. "

@@ -24,6 +24,7 @@ from neurosym.language.problem_family import Progress
 from neurosym.language.search_problem import Step
 from neurosym.planning.planner import OrderCounter
 from neurosym.registry import load_planner
+from neurosym.support.arrays import Array, Numbers
 from neurosym.support.disk_cache import cache_folder, load, store
 
 if TYPE_CHECKING:
@@ -31,7 +32,6 @@ if TYPE_CHECKING:
     from neurosym.language import Problem
 
 RECIPES = ("full", "paper")
-
 #: Raise it whenever the same cube would get other labels: they are kept on disk.
 LABELS_VERSION = 1
 
@@ -59,7 +59,7 @@ def demonstrate(
     progress: Progress | None = None,
 ) -> Demonstrations:
     """Demonstrations for the cubes of these numbers; pictures and labels come from disk where they were made before."""
-    from neurosym.simulation.picture_cache import cached_pictures
+    from neurosym.simulation.render import cached_pictures
 
     if recipe not in RECIPES:
         raise UnknownNameError("recipe", recipe, RECIPES)
@@ -96,9 +96,7 @@ def demonstrate(
 def habit(problem: Problem) -> tuple[str, ...]:
     """The demonstrator's order: whatever may leave, the topmost piece first, ties by the order of the pieces."""
     world, search = problem.world, problem.ground()
-    heights = {
-        name: float(world.X_WB[world.owners == i, 2, 3].mean()) for i, name in enumerate(world.names)
-    }
+    heights = {name: float(world.X_WB[world.owners == i, 2, 3].mean()) for i, name in enumerate(world.names)}
     ranked = sorted(range(len(search.actions)), key=lambda a: (-round(heights[search.actions[a]], 6), a))
     state, order = search.initial, []
     while not search.is_goal(state):
@@ -114,9 +112,7 @@ def habit(problem: Problem) -> tuple[str, ...]:
     return tuple(order)
 
 
-def _labels(
-    family: SomaFamily, cells: Mapping[str, tuple[Cell, ...]]
-) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+def _labels(family: SomaFamily, cells: Mapping[str, tuple[Cell, ...]]) -> tuple[Numbers, NDArray[np.float32]]:
     """For a cube in its 48 poses: the demonstrator's orders, int64 (48, 7), and the shares, float32 (48, 7, 7)."""
     key = hashlib.sha256(repr((LABELS_VERSION, sorted(cells.items()))).encode()).hexdigest()
     folder = cache_folder() / "soma-labels"
@@ -129,12 +125,10 @@ def _labels(
     return orders, shares
 
 
-def _count_labels(
-    family: SomaFamily, cells: dict[str, tuple[Cell, ...]]
-) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+def _count_labels(family: SomaFamily, cells: dict[str, tuple[Cell, ...]]) -> tuple[Numbers, NDArray[np.float32]]:
     """Gravity tells only which way is up, so six problems answer for 48 poses."""
     swap = [LETTERS.index({"A": "B", "B": "A"}.get(name, name)) for name in LETTERS]
-    known: dict[tuple[int, ...], tuple[NDArray[np.int64], NDArray[np.float64]]] = {}
+    known: dict[tuple[int, ...], tuple[Numbers, Array]] = {}
     orders = np.zeros((48, 7), dtype=np.int64)
     shares = np.zeros((48, 7, 7), dtype=np.float32)
     counter = load_planner("exhaustive")

@@ -3,16 +3,15 @@
 Pieces by Piet Hein; letters and the count of 240 as in Berlekamp, Conway, Guy, "Winning Ways", vol. 2.
 """
 
-from __future__ import annotations
-
 import warnings
 from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-Cell = tuple[int, int, int]
+from neurosym.support.arrays import Numbers
 
+Cell = tuple[int, int, int]
 #: Letter -> cells. A and B are mirror images of each other.
 PIECES: dict[str, tuple[Cell, ...]] = {
     "V": ((0, 0, 0), (1, 0, 0), (0, 1, 0)),
@@ -25,13 +24,12 @@ PIECES: dict[str, tuple[Cell, ...]] = {
 }
 
 LETTERS: tuple[str, ...] = tuple(PIECES)
-
 #: A mirror turns A into B; all other pieces are their own mirror images.
 MIRRORED: dict[str, str] = {"A": "B", "B": "A"}
 
 
 @cache
-def symmetries() -> NDArray[np.int64]:
+def symmetries() -> Numbers:
     """int64 (48, 3, 3): the symmetries of the cube as matrices; the 24 rotations first, the identity first of all."""
     found = []
     for permutation in ((0, 1, 2), (1, 2, 0), (2, 0, 1), (0, 2, 1), (1, 0, 2), (2, 1, 0)):
@@ -42,9 +40,7 @@ def symmetries() -> NDArray[np.int64]:
     return np.array(sorted(found, key=lambda m: -round(np.linalg.det(m))))
 
 
-def turned(
-    cells: dict[str, tuple[Cell, ...]], symmetry: NDArray[np.int64], side: int = 3
-) -> dict[str, tuple[Cell, ...]]:
+def turned(cells: dict[str, tuple[Cell, ...]], symmetry: Numbers, side: int = 3) -> dict[str, tuple[Cell, ...]]:
     """A cube's pieces under a symmetry of the cube; under a reflection A and B change names."""
     mirrored = np.linalg.det(symmetry) < 0
     found = {}
@@ -55,7 +51,7 @@ def turned(
     return {name: found[name] for name in cells}
 
 
-def _placements(cells: tuple[Cell, ...], side: int) -> list[NDArray[np.int64]]:
+def _placements(cells: tuple[Cell, ...], side: int) -> list[Numbers]:
     """Every way to put a piece into the cube, as sorted indices of cells."""
     seen = set()
     for rotation in symmetries()[:24]:
@@ -79,19 +75,17 @@ def _covers() -> NDArray[np.int8]:
             rows.append(row)
             owner.append(number)
     matrix = np.array(rows)
-    found = []
     with warnings.catch_warnings():
         # Of numba, when it first compiles xcover, about a hash in there; it is not the user's business.
         warnings.filterwarnings("ignore", message="unsafe cast from uint64")
         from xcover import covers_bool
 
         covers = list(covers_bool(matrix))
-    for cover in covers:
-        filled = np.zeros(27, dtype=np.int8)
+    filled = np.zeros((len(covers), 27), dtype=np.int8)
+    for cube, cover in zip(filled, covers):
         for row_number in cover:
-            filled[matrix[row_number, :27]] = owner[row_number]
-        found.append(filled)
-    return np.array(found)
+            cube[matrix[row_number, :27]] = owner[row_number]
+    return filled
 
 
 #: Where the T lies in every listed solution: flat at the bottom, its bar along an edge.

@@ -6,13 +6,11 @@ and that rests stably on what is there. Which level comes next follows from how 
 make N action primitives, whatever the tower.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from domains import tower_rules as rules
 from domains.tower_blocks import COLOURS, Block, ReferenceTower
@@ -25,6 +23,7 @@ from neurosym.geometry.step_motion import StepMotion
 from neurosym.language import Problem
 from neurosym.language.demonstrations import Demonstrations
 from neurosym.language.problem_family import ProblemFamily, Progress
+from neurosym.support.arrays import Pixels
 
 
 class TowerFamily(ProblemFamily):
@@ -126,8 +125,7 @@ class TowerFamily(ProblemFamily):
 
         Two thirds are ``"train"``, the others ``"test"``; ``"all"`` is all of the variant, in order.
 
-        Args:
-            by: ``"tower"``: the parts share no tower; ``"sequence"``: no colour sequence either.
+        `by`: ``"tower"``: the parts share no tower; ``"sequence"``: no colour sequence either.
         """
         return split_numbers(variant, part, split, by)
 
@@ -138,24 +136,19 @@ class TowerFamily(ProblemFamily):
         numbers = self.numbers(part, split=split, variant=variant, by=by)
         return [self.problem(n, variant=variant, **options) for n in numbers]
 
-    def observe(self, problem: Problem) -> NDArray[np.uint8]:
-        return take_picture(problem.world, problem.details["pictures"], np.random.default_rng(problem.details["seed"]))
-
     def staging(self, problem: Problem, plan: Sequence[str], motions: Sequence[StepMotion | None]) -> Staging:
         tower = problem.world
         standing = tuple(str(atom.args[0]) for atom in problem.init if atom.predicate == rules.placed)
         order = (*standing, *plan)
         return building(tower.built(order), standing, plan, {n: COLOURS[tower.kinds[n][0]] for n in order})
 
-    def pictures(
-        self, problem: Problem, *, style: str = "easy", rng: np.random.Generator | None = None
-    ) -> NDArray[np.uint8]:
+    def pictures(self, problem: Problem, *, style: str = "easy", rng: np.random.Generator | None = None) -> Pixels:
         """One view from the side, uint8 (1, 64, 64, 3), of the tower as it is; `style` says how it is pictured."""
         return take_picture(problem.world, style, rng or np.random.default_rng(0))
 
     def take_pictures(
         self, problems: Sequence[Problem], *, style: str, workers: int = 1, progress: Progress | None = None
-    ) -> NDArray[np.uint8]:
+    ) -> Pixels:
         """Pictures of many problems, from disk where they were taken before."""
         worlds, seeds = [p.world for p in problems], [p.details["seed"] for p in problems]
         return take_pictures(worlds, seeds, style=style, workers=workers, progress=progress)
@@ -175,10 +168,8 @@ class TowerFamily(ProblemFamily):
     ) -> Demonstrations:
         """Demonstrations for a training recipe, see `domains.tower_demonstrations`.
 
-        Args:
-            variant: which towers.
-            by: how the parts are split.
-            count: only the first so many of the part, a random sample of it; None takes all.
+        `variant`: which towers. `by`: how the parts are split. `count`: only the first so many of the part, a random
+        sample of it; None takes all.
         """
         numbers = self.numbers(part, split=split, variant=variant, by=by)
         if count is not None and not 0 < count <= len(numbers):

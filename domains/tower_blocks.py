@@ -1,24 +1,22 @@
 """Blocks, and the reference towers made of them: the world that the tower domain's predicates are asked about."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
+from typing import Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from neurosym.errors import AssemblyError, UnknownNameError
 from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.queries import AssemblyGeometry
 from neurosym.geometry.rigid_motions import shifted
 from neurosym.geometry.shapes import boxes_part
+from neurosym.support.arrays import Array
 
-Array = NDArray[np.float64]
 #: What makes blocks interchangeable: a colour and a size (width along x, depth along y, height).
 Kind = tuple[str, tuple[float, float, float]]
-
 #: Colours of blocks, RGB in 0..1. Their hues lie far enough apart to stay themselves in the hard pictures.
 COLOURS: Mapping[str, tuple[float, float, float]] = {
     "red": (0.82, 0.12, 0.10),
@@ -34,14 +32,8 @@ COLOURS: Mapping[str, tuple[float, float, float]] = {
 class Block:
     """A block: a box that can be placed once.
 
-    Attributes:
-        name: of the block, and of the action primitive that places it.
-        colour: one of `COLOURS`.
-        size: width (x), depth (y) and height (z), in any unit of length.
-
-    Raises:
-        UnknownNameError: no such colour.
-        AssemblyError: a size that is not three lengths above 0.
+    Its name is that of the action primitive that places it, its colour one of `COLOURS`, its size width (x), depth (y)
+    and height (z), in any unit. Raises UnknownNameError: no such colour; AssemblyError: not three lengths above 0.
     """
 
     name: str
@@ -87,12 +79,11 @@ class ReferenceTower:
         levels: Sequence[str],
         offsets: ArrayLike | None = None,
         frame: float | None = None,
-    ) -> ReferenceTower:
+    ) -> Self:
         """A reference tower, checked; without offsets it stands plumb.
 
-        Raises:
-            AssemblyError: no levels, a name that two blocks bear or two levels take, offsets of another shape.
-            UnknownNameError: a level of no known block.
+        Raises AssemblyError: no levels, a name that two blocks bear or two levels take, offsets of another shape;
+        UnknownNameError: a level of no known block.
         """
         names = [b.name for b in blocks]
         if twice := sorted({n for n in names if names.count(n) > 1}):
@@ -150,32 +141,29 @@ class ReferenceTower:
     def built(self, order: Sequence[str]) -> Assembly:
         """The tower that these blocks make, from the bottom up: parts on the levels' places, named after the blocks.
 
-        Raises:
-            UnknownNameError: no such block.
-            AssemblyError: more blocks than levels, or none.
+        Raises UnknownNameError: no such block; AssemblyError: more blocks than levels, or none.
         """
         if not 0 < len(order) <= len(self.levels):
             raise AssemblyError(f"Expected 1 to {len(self.levels)} blocks; got {len(order)}.")
-        parts, top = [], 0.0
-        for name, (x, y) in zip(order, self.offsets.tolist()):
+        for name in order:
             if name not in self.kinds:
                 raise UnknownNameError("block", name, self.names)
-            size = self.kinds[name][1]
-            at = shifted((x, y, top + size[2] / 2))
-            parts.append(boxes_part(name, np.zeros((1, 3)), np.array(size), at))
-            top += size[2]
-        return Assembly(tuple(parts), table=0.0)
+        return _stacked(order, [self.kinds[name][1] for name in order], self.offsets.tolist())
 
-    def anew(self) -> ReferenceTower:
+    def anew(self) -> Self:
         """The same tower with nothing remembered: every question is asked anew."""
         return replace(self, tabulate=False)
 
 
 @lru_cache(maxsize=4096)
 def _stack(sizes: tuple[tuple[float, float, float], ...], offsets: tuple[tuple[float, float], ...]) -> AssemblyGeometry:
+    return AssemblyGeometry(_stacked([f"level {i}" for i in range(1, len(sizes) + 1)], sizes, offsets))
+
+
+def _stacked(names: Sequence[str], sizes: Sequence[Sequence[float]], offsets: Sequence[Sequence[float]]) -> Assembly:
     parts, top = [], 0.0
-    for i, (size, (x, y)) in enumerate(zip(sizes, offsets), 1):
+    for name, size, (x, y) in zip(names, sizes, offsets):
         at = shifted((x, y, top + size[2] / 2))
-        parts.append(boxes_part(f"level {i}", np.zeros((1, 3)), np.array(size), at))
+        parts.append(boxes_part(name, np.zeros((1, 3)), np.array(size), at))
         top += size[2]
-    return AssemblyGeometry(Assembly(tuple(parts), table=0.0))
+    return Assembly(tuple(parts), table=0.0)

@@ -5,8 +5,6 @@
 ``full``   besides, the share of all valid orders that have each block at each step: blocks of one colour share equally.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 
@@ -54,9 +52,7 @@ def demonstrate(
         levels = [blocks[b].name for b in towers(variant)[number]]
         references.append(ReferenceTower.of(blocks, levels, draw_offsets(style, len(levels), own), frame=TALLEST))
         seeds.append(own)
-    pictures = take_pictures(
-        references, seeds, style=style, workers=workers or os.cpu_count() or 1, progress=progress
-    )
+    pictures = take_pictures(references, seeds, style=style, workers=workers or os.cpu_count() or 1, progress=progress)
     kinds = list(dict.fromkeys((b.colour, b.size) for b in blocks))
     return Demonstrations(
         pictures=pictures,
@@ -72,8 +68,7 @@ def demonstrate(
 def shares(variant: str, colours: Sequence[str]) -> NDArray[np.float32]:
     """The share of all valid orders of a colour sequence with each block at each step, float32 (n_levels, n_blocks)."""
     own = np.array([[b.colour == colour for b in blocks_of(variant)] for colour in colours], dtype=np.float32)
-    found: NDArray[np.float32] = own / own.sum(axis=1, keepdims=True)
-    return found
+    return np.asarray(own / own.sum(axis=1, keepdims=True))
 
 
 def _chance_order(variant: str, colours: Sequence[str], rng: np.random.Generator) -> list[int]:

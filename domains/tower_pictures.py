@@ -10,22 +10,17 @@ What stands where is geometry: the offsets drawn here are those that stability i
 ``varied``, the names that other families use, stand for easy and hard.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from domains.tower_blocks import COLOURS, ReferenceTower
 from neurosym.errors import UnknownNameError
 from neurosym.language.problem_family import Progress
-
-if TYPE_CHECKING:
-    from neurosym.simulation.looks import Camera, Style
-    from neurosym.simulation.scene import Scene
+from neurosym.simulation.looks import Camera, Style
+from neurosym.simulation.scene import Scene, scene_of
+from neurosym.support.arrays import Array, Pixels
 
 #: Other families' names for the settings.
 ALIASES = {"clean": "easy", "varied": "hard"}
@@ -37,10 +32,8 @@ _OFFSET_STREAM = 0x0F_F5_E7
 class Untidiness:
     """How untidily towers are built, in shares of a block's edge: each is the most, drawn uniformly.
 
-    Attributes:
-        shift: of the whole tower, along x and along y, either way.
-        lean: of each level against the one below, in one direction, the same for the whole tower.
-        jitter: of each block by itself, in any direction.
+    `shift`: of the whole tower, along x and along y, either way. `lean`: of each level against the one below, in one
+    direction, the same for the whole tower. `jitter`: of each block by itself, in any direction.
     """
 
     shift: float = 0.0
@@ -48,79 +41,12 @@ class Untidiness:
     jitter: float = 0.0
 
 
-#: The upper levels' centre of mass lies at most 3 leans and 2 jitters off the lowest block's middle: 0.39 of its edge.
-SETTINGS = {"easy": Untidiness(), "hard": Untidiness(shift=0.4, lean=0.05, jitter=0.12)}
-
-
-def setting_named(name: str) -> str:
-    """The setting that a name or an alias stands for.
-
-    Raises:
-        UnknownNameError: no such setting.
-    """
-    found = ALIASES.get(name, name)
-    if found not in SETTINGS:
-        raise UnknownNameError("style of pictures", name, (*SETTINGS, *ALIASES))
-    return found
-
-
-def picture_seed(seed: int, variant: str, number: int) -> int:
-    """The seed of one picture, and of the offsets behind it."""
-    return int(np.random.SeedSequence([seed, *variant.encode(), number]).generate_state(1)[0])
-
-
-def draw_offsets(setting: str, n_levels: int, seed: int) -> NDArray[np.float64]:
-    """Where a tower of cubes of edge one has its levels: float64 (n_levels, 2), off the plumb line along x and y."""
-    most = SETTINGS[setting_named(setting)]
-    rng = np.random.default_rng([_OFFSET_STREAM, seed])
-    shift, lean = rng.uniform(-most.shift, most.shift, 2), most.lean * _in_disc(rng, 1)
-    offsets: NDArray[np.float64] = shift + lean * np.arange(n_levels)[:, None] + most.jitter * _in_disc(rng, n_levels)
-    return offsets
-
-
-def _in_disc(rng: np.random.Generator, n: int) -> NDArray[np.float64]:
-    """Points drawn uniformly from the unit disc, float64 (n, 2)."""
-    radius, angle = np.sqrt(rng.random(n)), rng.uniform(0, 2 * np.pi, n)
-    return np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1)
-
-
-def take_pictures(
-    towers: Sequence[ReferenceTower],
-    seeds: Sequence[int],
-    *,
-    style: str,
-    workers: int = 1,
-    progress: Progress | None = None,
-) -> NDArray[np.uint8]:
-    """One picture a tower, uint8 (n, 1, 64, 64, 3), from disk where it was taken before."""
-    from neurosym.simulation.picture_cache import cached_pictures
-
-    jobs = [(_scene(tower), seed) for tower, seed in zip(towers, seeds, strict=True)]
-    return cached_pictures(jobs, style=look(style), workers=workers, progress=progress, cameras=cameras())
-
-
-def take_picture(tower: ReferenceTower, style: str, rng: np.random.Generator) -> NDArray[np.uint8]:
-    """The picture of one tower, uint8 (1, 64, 64, 3)."""
-    from neurosym.simulation.render import PictureStudio  # loads PyBullet
-
-    with PictureStudio() as studio:
-        return studio.views(_scene(tower), style=look(style), rng=rng, cameras=cameras())
-
-
-def cameras() -> tuple[Camera, ...]:
-    """The one camera: from the side (+x), raised a little."""
-    from neurosym.simulation.looks import Camera
-
-    return (Camera(0, 12, distance=6.6),)
-
-
-def look(style: str) -> Style:
-    """What chance may vary in a setting besides the tower itself."""
-    from neurosym.simulation.looks import Style
-
-    if setting_named(style) == "easy":
-        return Style()
-    return Style(
+#: The one camera: from the side (+x), raised a little.
+CAMERAS = (Camera(0, 12, distance=6.6),)
+#: What chance may vary in a setting besides the tower itself.
+LOOKS = {
+    "easy": Style(),
+    "hard": Style(
         light_azimuth=(-90.0, 90.0),
         light_elevation=(20.0, 80.0),
         ambient=(0.35, 0.65),
@@ -133,12 +59,64 @@ def look(style: str) -> Style:
         hue=0.05,
         brightness=0.3,
         noise=(5.0, 25.0),
-    )
+    ),
+}
+#: The upper levels' centre of mass lies at most 3 leans and 2 jitters off the lowest block's middle: 0.39 of its edge.
+SETTINGS = {"easy": Untidiness(), "hard": Untidiness(shift=0.4, lean=0.05, jitter=0.12)}
+
+
+def setting_named(name: str) -> str:
+    """The setting that a name or an alias stands for. Raises UnknownNameError: no such setting."""
+    setting = ALIASES.get(name, name)
+    if setting not in SETTINGS:
+        raise UnknownNameError("style of pictures", name, (*SETTINGS, *ALIASES))
+    return setting
+
+
+def picture_seed(seed: int, variant: str, number: int) -> int:
+    """The seed of one picture, and of the offsets behind it."""
+    return int(np.random.SeedSequence([seed, *variant.encode(), number]).generate_state(1)[0])
+
+
+def draw_offsets(setting: str, n_levels: int, seed: int) -> Array:
+    """Where a tower of cubes of edge one has its levels: float64 (n_levels, 2), off the plumb line along x and y."""
+    most = SETTINGS[setting_named(setting)]
+    rng = np.random.default_rng([_OFFSET_STREAM, seed])
+    shift, lean = rng.uniform(-most.shift, most.shift, 2), most.lean * _in_disc(rng, 1)
+    offsets: Array = shift + lean * np.arange(n_levels)[:, None] + most.jitter * _in_disc(rng, n_levels)
+    return offsets
+
+
+def _in_disc(rng: np.random.Generator, n: int) -> Array:
+    """Points drawn uniformly from the unit disc, float64 (n, 2)."""
+    radius, angle = np.sqrt(rng.random(n)), rng.uniform(0, 2 * np.pi, n)
+    return np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1)
+
+
+def take_pictures(
+    towers: Sequence[ReferenceTower],
+    seeds: Sequence[int],
+    *,
+    style: str,
+    workers: int = 1,
+    progress: Progress | None = None,
+) -> Pixels:
+    """One picture a tower, uint8 (n, 1, 64, 64, 3), from disk where it was taken before."""
+    from neurosym.simulation.render import cached_pictures
+
+    jobs = [(_scene(tower), seed) for tower, seed in zip(towers, seeds, strict=True)]
+    return cached_pictures(jobs, style=LOOKS[setting_named(style)], workers=workers, progress=progress, cameras=CAMERAS)
+
+
+def take_picture(tower: ReferenceTower, style: str, rng: np.random.Generator) -> Pixels:
+    """The picture of one tower, uint8 (1, 64, 64, 3)."""
+    from neurosym.simulation.render import PictureStudio  # loads PyBullet
+
+    with PictureStudio() as studio:
+        return studio.views(_scene(tower), style=LOOKS[setting_named(style)], rng=rng, cameras=CAMERAS)
 
 
 def _scene(tower: ReferenceTower) -> Scene:
-    from neurosym.simulation.scene import scene_of
-
     colours = {name: COLOURS[colour] for name, colour in zip(tower.assembly.names, tower.colours)}
     height = tower.frame or float(tower.assembly.bounds[1, 2])
     # The camera stays where it is: a low tower looks low.

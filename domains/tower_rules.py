@@ -1,7 +1,5 @@
 """The rules of building: one symbolic domain, and the derived predicates that read the reference and geometry."""
 
-from __future__ import annotations
-
 from domains.tower_blocks import Kind, ReferenceTower
 from neurosym.language import Action, Derived, Domain, Fluent, State, Type
 from neurosym.language.search_problem import Verdict
@@ -38,11 +36,7 @@ def _matches(world: ReferenceTower, state: State, b: str) -> Verdict:
 
 
 def _before(world: ReferenceTower, state: State, level: int, kind: Kind) -> tuple[str, ...]:
-    """Blocks of which one must be placed before a level asks for `kind`; none: no level will.
-
-    Every level in between must be built. Of the kinds they ask for, the one asked for last, for the first time,
-    keeps the promise longest.
-    """
+    """Blocks of which one must be placed before a level asks for `kind`; none: no level will."""
     if kind not in world.reference[level:]:
         return ()
     between = world.reference[level : world.reference.index(kind, level)]
@@ -58,9 +52,9 @@ def _rests(world: ReferenceTower, state: State, b: str) -> Verdict:
         return Verdict(True)
     names = (*_built(world, state), b)
     because = tuple(names[i] for i in falling)
-    said = f"With {b} on level {height + 1} the tower topples: {', '.join(because)} would fall."
+    reason = f"With {b} on level {height + 1} the tower topples: {', '.join(because)} would fall."
     # No other kind of block may come next, and any of this kind topples it: this is for good.
-    return Verdict(False, because, said, ())
+    return Verdict(False, because, reason, ())
 
 
 def _finished(world: ReferenceTower, state: State) -> Verdict:
@@ -82,10 +76,9 @@ def _left(world: ReferenceTower, state: State) -> list[str]:
 def _built(world: ReferenceTower, state: State) -> list[str]:
     """The blocks that are placed, level by level; of blocks of one kind it does not matter which is where."""
     there = [n for n in world.names if state.holds(placed(n))]
-    built = []
+    built: list[str] = []
     for kind in world.reference[: len(there)]:
-        name = next(n for n in there if world.kinds[n] == kind and n not in built)
-        built.append(name)
+        built.append(next(n for n in there if world.kinds[n] == kind and n not in built))
     return built
 
 
@@ -95,7 +88,5 @@ rests = Derived("rests", [block], _rests)
 finished = Derived("finished", [], _finished)
 
 _b = block("b")
-place = Action(
-    "place", _b, pre=[stocked(_b), unused(_b), matches(_b), rests(_b)], eff=[placed(_b)], label="{b}"
-)
+place = Action("place", _b, pre=[stocked(_b), unused(_b), matches(_b), rests(_b)], eff=[placed(_b)], label="{b}")
 TOWER = Domain("tower", fluents=[placed, stocked], actions=[place])

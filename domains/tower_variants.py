@@ -6,16 +6,14 @@
              (Sec. IV-C).
 """
 
-from __future__ import annotations
-
 import itertools
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from domains.tower_blocks import COLOURS, Block
 from neurosym.errors import InputError, UnknownNameError
+from neurosym.support.arrays import Truths
 
 VARIANTS = ("colours", "unique", "heights")
 #: Levels of the tallest tower.
@@ -32,11 +30,7 @@ _UNIQUE = tuple(Block(colour, colour) for colour in COLOURS)
 
 
 def blocks_of(variant: str) -> tuple[Block, ...]:
-    """The six blocks of a variant.
-
-    Raises:
-        UnknownNameError: no such variant.
-    """
+    """The six blocks of a variant. Raises UnknownNameError: no such variant."""
     if variant not in VARIANTS:
         raise UnknownNameError("variant", variant, VARIANTS)
     return _UNIQUE if variant == "unique" else _PAIRED
@@ -53,8 +47,8 @@ def towers(variant: str) -> tuple[tuple[int, ...], ...]:
 @cache
 def sequences(variant: str) -> tuple[tuple[str, ...], ...]:
     """The different colour sequences, from the bottom up, the lower towers first."""
-    found = {colours_of(variant, number) for number in range(len(towers(variant)))}
-    return tuple(sorted(found, key=lambda colours: (len(colours), colours)))
+    different = {colours_of(variant, number) for number in range(len(towers(variant)))}
+    return tuple(sorted(different, key=lambda colours: (len(colours), colours)))
 
 
 @cache
@@ -73,13 +67,9 @@ def colours_of(variant: str, number: int) -> tuple[str, ...]:
 def split_numbers(variant: str, part: str, split: int, by: str) -> tuple[int, ...]:
     """Numbers of the towers of a part, ``"train"``, ``"test"`` or ``"all"``, in random order ("all" in their own).
 
-    Args:
-        split: which random split. A tower of `heights` that is one of `colours` too is in the same part of both.
-        by: ``"tower"`` deals out towers, ``"sequence"`` colour sequences with all their towers.
-
-    Raises:
-        UnknownNameError: no such variant, part or way to divide.
-        InputError: a split below 0.
+    `split`: which random split. A tower of `heights` that is one of `colours` too is in the same part of both. `by`:
+    ``"tower"`` deals out towers, ``"sequence"`` colour sequences with all their towers. Raises UnknownNameError: no
+    such variant, part or way to divide; InputError: a split below 0.
     """
     if by not in DIVIDED:
         raise UnknownNameError("way to split", by, DIVIDED)
@@ -93,17 +83,12 @@ def split_numbers(variant: str, part: str, split: int, by: str) -> tuple[int, ..
     to_train = _trains(variant, split, by)
     rng = np.random.default_rng([_ORDER_STREAM, VARIANTS.index(variant), DIVIDED.index(by), split])
     order = rng.permutation(total)
-    chosen = order[to_train[order] == (part == "train")]
-    return tuple(int(n) for n in chosen)
+    return tuple(order[to_train[order] == (part == "train")].tolist())
 
 
 @cache
-def _trains(variant: str, split: int, by: str) -> NDArray[np.bool_]:
-    """bool (n_towers,): which towers are to train.
-
-    The towers of six levels among ``heights`` are those of ``colours``, and go where these go: what was trained on the
-    one is tested on the other without having seen it.
-    """
+def _trains(variant: str, split: int, by: str) -> Truths:
+    """bool (n_towers,): which towers are to train."""
     known = towers(variant)
     ids = np.array(sequence_numbers(variant)) if by == "sequence" else np.arange(len(known))
     divided = np.full(ids.max() + 1, False)
@@ -116,5 +101,4 @@ def _trains(variant: str, split: int, by: str) -> NDArray[np.bool_]:
         free = np.unique(ids[~tall])
     rng = np.random.default_rng([_SPLIT_STREAM, VARIANTS.index(variant), DIVIDED.index(by), split])
     divided[rng.permutation(free)[: round(TRAIN_SHARE * len(free))]] = True
-    found: NDArray[np.bool_] = divided[ids]
-    return found
+    return np.asarray(divided[ids])

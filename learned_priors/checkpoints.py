@@ -3,8 +3,6 @@
 A file is complete or absent: it is written beside its place and renamed.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from pathlib import Path

@@ -4,8 +4,6 @@
 `forward` is what is learned.
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from itertools import pairwise
@@ -24,9 +22,7 @@ PictureShape = tuple[int, int, int, int]
 class Encoder(nn.Module, ABC):
     """Pictures -> features.
 
-    Attributes:
-        out_features: length of the feature vector.
-        places_shape: (V, R, C, 3), what `places` gives of each.
+    `out_features`: length of the feature vector. `places_shape`: (V, R, C, 3), what `places` gives of each.
     """
 
     out_features: int

@@ -1,7 +1,5 @@
 """What stays on the device while a network is trained, and one update of it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -9,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
 from learned_priors.losses import cross_entropy, loss_of, targets_of
 from learned_priors.metrics import whole_order_accuracy
@@ -17,6 +14,7 @@ from learned_priors.networks import CHUNK, Logits, NetworkConfig, OrderNetwork
 from learned_priors.train_config import TrainConfig
 from neurosym.errors import InputError
 from neurosym.language.demonstrations import Demonstrations
+from neurosym.support.arrays import Numbers
 
 #: Keeps the draws for dropout and Gumbel noise apart from other uses of the seed.
 _NOISE = 2
@@ -47,7 +45,7 @@ class Learner:
             chunks = self.network.chunks(demonstrations.pictures)
             self.prepared = torch.cat([self.network.prepare(chunk) for chunk in chunks])
 
-    def update(self, index: NDArray[np.int64], done: int) -> float:
+    def update(self, index: Numbers, done: int) -> float:
         """Update number `done` (from 0) on the demonstrations at `index`; their loss, weighted by their number."""
         for group in self.optimizer.param_groups:
             group["lr"] = learning_rate(done, self.total, self.config)
@@ -67,7 +65,7 @@ class Learner:
         return value * len(index)
 
     @torch.no_grad()
-    def measure(self, index: NDArray[np.int64]) -> tuple[float, float]:
+    def measure(self, index: Numbers) -> tuple[float, float]:
         """Held-out loss and share of whole orders right."""
         i = torch.from_numpy(index).to(self.device)
         with self._noise(0):
@@ -81,7 +79,7 @@ class Learner:
         return loss, right
 
     @torch.no_grad()
-    def calibrate(self, index: NDArray[np.int64]) -> None:
+    def calibrate(self, index: Numbers) -> None:
         """Set the network's temperature to the one of the least cross-entropy on `index`."""
         i = torch.from_numpy(index).to(self.device)
         logits, target, before = self._logits(i), self.target[i].to(torch.float64), self.network.config

@@ -1,7 +1,5 @@
 """What the networks are trained on: log-probabilities by step against demonstrated orders, or shares of valid ones."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import torch

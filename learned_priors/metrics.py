@@ -1,7 +1,5 @@
 """Early figures: how well order scores match demonstrations. Whether an order holds, a planner or oracle decides."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np
@@ -9,23 +7,18 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import linear_sum_assignment
 
 from neurosym.planning.order_scores import OrderScores
+from neurosym.support.arrays import Numbers, Truths
 
-Orders = NDArray[np.int64]
 
-
-def decoded(log_prob: ArrayLike, classes: Sequence[int] = (), *, log_length: ArrayLike | None = None) -> Orders:
+def decoded(log_prob: ArrayLike, classes: Sequence[int] = (), *, log_length: ArrayLike | None = None) -> Numbers:
     """The likeliest orders, by the Hungarian algorithm: no action twice.
 
     With unsure lengths, the likeliest number of steps is taken first, then the best assignment to these steps (the
     paper's masking, Sec. IV-B).
 
-    Args:
-        log_prob: (M, T, N), log-probability of each action at each step.
-        classes: one integer an action; the probabilities of one class are summed.
-        log_length: (M, T + 1), log-probability of 0 .. T steps; None where there are always T.
-
-    Returns:
-        int64 (M, T), -1 after the last step.
+    `log_prob`: (M, T, N), log-probability of each action at each step. `classes`: one integer an action; the
+    probabilities of one class are summed. `log_length`: (M, T + 1), log-probability of 0 .. T steps; None where there
+    are always T. Returns int64 (M, T), -1 after the last step.
     """
     tables = np.asarray(log_prob, dtype=np.float64)
     orders = np.full(tables.shape[:2], -1, dtype=np.int64)
@@ -36,17 +29,17 @@ def decoded(log_prob: ArrayLike, classes: Sequence[int] = (), *, log_length: Arr
     return orders
 
 
-def step_matches(orders: Orders, sequences: Orders, classes: Sequence[int] = ()) -> NDArray[np.bool_]:
+def step_matches(orders: Numbers, sequences: Numbers, classes: Sequence[int] = ()) -> Truths:
     """bool (M, T): the step names an action of the demonstrated one's class, or is not taken. Both int64 (M, T)."""
     label = np.asarray(classes) if classes else np.arange(max(int(orders.max()), int(sequences.max())) + 1)
     same = label[np.maximum(orders, 0)] == label[np.maximum(sequences, 0)]
-    matches: NDArray[np.bool_] = (same & (orders >= 0)) | (sequences < 0)
+    matches: Truths = (same & (orders >= 0)) | (sequences < 0)
     return matches
 
 
 def whole_order_accuracy(
     log_prob: ArrayLike,
-    sequences: Orders,
+    sequences: Numbers,
     *,
     log_length: ArrayLike | None = None,
     marginals: NDArray[np.float32] | None = None,
@@ -71,7 +64,7 @@ def whole_order_accuracy(
     return float(right.mean())
 
 
-def calibration_error(log_prob: ArrayLike, sequences: Orders, *, classes: Sequence[int] = (), bins: int = 10) -> float:
+def calibration_error(log_prob: ArrayLike, sequences: Numbers, *, classes: Sequence[int] = (), bins: int = 10) -> float:
     """Expected calibration error (Guo et al., ICML 2017, eq. 3) of each step's likeliest class of actions.
 
     The steps taken are sorted by their confidence into bins of equal width; it is the mean difference, weighted by

@@ -5,8 +5,6 @@ All take ``weights=FILE`` (None: the bundled ones), ``domain=NAME`` (whose bundl
 Burke, Subr, Ramamoorthy (RA-L 2021).
 """
 
-from __future__ import annotations
-
 from functools import partial
 
 from learned_priors.network_prior import NetworkPrior

@@ -1,7 +1,5 @@
 """What each named prior is made of: the network's head, and its training."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any

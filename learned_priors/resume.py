@@ -1,7 +1,5 @@
 """The state of a training run on disk, so that a run that was killed goes on where it was."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import math

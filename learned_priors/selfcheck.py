@@ -1,7 +1,5 @@
 """Does torch work here? `neurosym doctor` asks, through the entry point group ``neurosym.checks``."""
 
-from __future__ import annotations
-
 
 def torch_works() -> str:
     """Solve a small least-squares problem by gradient descent; returns one line about it, raises where it fails."""

@@ -7,16 +7,13 @@ ROWS: a row is a distribution over actions at one step, which is what the losses
 likelihood taken after a last column normalisation is not bounded below.)
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
-Array = NDArray[np.float64]
+from neurosym.support.arrays import Array, Numbers
 
 #: Sums of rows and columns may be off by this much: far below what changes an order, and reached within some tens
 #: of iterations on trained logits.
@@ -95,11 +92,9 @@ def gumbel_sinkhorn(
     """Samples of log S((X + noise * G) / temperature), G independent standard Gumbel (Mena et al. 2018, Sec. 3).
 
     Args:
-        logits: (..., T, N).
         samples: their number; the paper's models use five.
         temperature: tau; towards 0 the samples become permutations.
         noise: factor on the Gumbel noise; 0 makes every sample the same.
-        iterations: column updates, a fixed number.
         generator: source of the noise; None is torch's global one.
 
     Returns:
@@ -171,7 +166,7 @@ def scaled_sinkhorn(
 
 def _alternated(
     x: Array, mass: Array, rows: Array, columns: Array, tolerance: float | None, iterations: int
-) -> NDArray[np.int64]:
+) -> Numbers:
     """Fill in the potentials after at most so many iterations; returns which matrices miss the tolerance then."""
     within = -1.0 if tolerance is None else tolerance  # nothing is
     table = np.exp(x)

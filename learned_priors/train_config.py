@@ -1,10 +1,8 @@
 """How a network is trained: every number in one place."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
 from neurosym.errors import UnknownNameError
 
@@ -67,7 +65,7 @@ class TrainConfig:
     precision: Literal["float32", "bfloat16"] = "float32"
     checkpoint_seconds: float = 5.0
 
-    def changed(self, settings: Mapping[str, Any]) -> TrainConfig:
+    def changed(self, settings: Mapping[str, Any]) -> Self:
         """With other values of some fields. Raises `UnknownNameError` for what is none."""
         for name in settings:
             if name not in self.__dataclass_fields__:

@@ -4,8 +4,6 @@ Nothing random outlives an update: the order of an epoch is drawn from (seed, ep
 (seed, update). So a checkpoint needs no state of a generator, and a run that was killed ends where it would have.
 """
 
-from __future__ import annotations
-
 import copy
 import math
 import time
@@ -17,7 +15,6 @@ from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
 from learned_priors.checkpoints import in_precision
 from learned_priors.learner import Learner
@@ -26,6 +23,7 @@ from learned_priors.resume import RunState, fingerprint, load_state, save_state
 from learned_priors.train_config import TrainConfig
 from neurosym.errors import DemonstrationError, InputError
 from neurosym.language.demonstrations import Demonstrations
+from neurosym.support.arrays import Numbers
 
 #: Keep the draws for the order of an epoch and for what is held out apart from other uses of the seed.
 _ORDER, _SPLIT = 1, 3
@@ -133,7 +131,7 @@ def fit(
     }
 
 
-def _finish_epoch(run: Learner, state: RunState, seen: int, held: NDArray[np.int64]) -> None:
+def _finish_epoch(run: Learner, state: RunState, seen: int, held: Numbers) -> None:
     """Measure, keep the best weights, decide whether to stop."""
     held_loss, right = run.measure(held) if len(held) else (None, None)
     if held_loss is not None and held_loss < state.best_loss:
@@ -147,7 +145,7 @@ def _finish_epoch(run: Learner, state: RunState, seen: int, held: NDArray[np.int
     state.stopped = patience is not None and len(held) > 0 and state.epoch - state.best_epoch >= patience
 
 
-def _split(demonstrations: Demonstrations, share: float, seed: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _split(demonstrations: Demonstrations, share: float, seed: int) -> tuple[Numbers, Numbers]:
     """Indices to learn from and to hold out; whole groups, so that a turned copy of a problem is not measured."""
     groups = np.unique(np.asarray(demonstrations.groups))
     n_held = round(share * len(groups))

@@ -4,12 +4,10 @@ These are named ``{domain}-{prior}.safetensors``, or ``{domain}-{kind}-{prior}``
 a domain's problems; their headers say the rest.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import torch
 
@@ -17,10 +15,8 @@ from learned_priors.checkpoints import load_network
 from learned_priors.recipes import RECIPES, Recipe
 from learned_priors.trained_network import TrainedNetwork
 from neurosym.errors import CheckpointError, InputError
+from neurosym.language.problem import Problem
 from neurosym.planning.weights_header import read_header
-
-if TYPE_CHECKING:
-    from neurosym.language.problem import Problem
 
 FOLDER = Path(__file__).parent / "weights"
 

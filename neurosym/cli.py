@@ -3,8 +3,6 @@
 Exit codes are in `neurosym.commands.exit_codes`. Nothing heavy is imported before a command needs it.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable, Sequence
 from typing import Annotated
@@ -77,8 +75,7 @@ def _options(
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line, and leave with one of `EXIT_CODES`.
 
-    Args:
-        arguments: as typed after `neurosym`; None takes those of the process.
+    `arguments`: as typed after `neurosym`; None takes those of the process.
     """
     try:
         app(args=None if arguments is None else list(arguments), prog_name="neurosym")

@@ -15,8 +15,6 @@ Every message says what was expected, what came, and what to do. That there is n
 exception: it is a `PlanResult`.
 """
 
-from __future__ import annotations
-
 import difflib
 from collections.abc import Iterable
 

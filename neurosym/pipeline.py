@@ -1,7 +1,5 @@
 """`solve`: the whole flow on one page. Read this first."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager

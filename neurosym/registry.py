@@ -3,8 +3,6 @@
 Wherever a name is taken, an object is too.
 """
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Callable
 from functools import cache

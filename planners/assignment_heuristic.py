@@ -4,8 +4,6 @@ It is admissible and consistent as a cost-to-go, because the true completion is 
 actions to the remaining steps, and taking an action fixes one of its rows.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

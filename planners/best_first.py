@@ -1,7 +1,5 @@
 """Best-first search, lazy: a candidate waits under its cost and is put to the oracle only when it is its turn."""
 
-from __future__ import annotations
-
 import heapq
 import math
 from collections import Counter

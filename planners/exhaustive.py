@@ -1,7 +1,5 @@
 """Exhaustive search of the graph of states: the reference that tests compare the others with."""
 
-from __future__ import annotations
-
 import heapq
 
 from neurosym.planning.planner import PlannerTraits

@@ -1,7 +1,5 @@
 """A state, and the way that a search took to it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Any, Self
 

@@ -1,7 +1,5 @@
 """Preferred actions: those that recent rejections named are tried next (as in Fast Downward)."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Sequence
 from functools import cached_property

@@ -1,7 +1,5 @@
 """Priority functions of best-first search: which waiting attempt is put to the oracle next (the least first)."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

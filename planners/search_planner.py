@@ -1,7 +1,5 @@
 """Planners that are one function of a search context."""
 
-from __future__ import annotations
-
 from abc import abstractmethod
 from collections.abc import Generator
 from typing import Any, TypeVar

@@ -3,8 +3,6 @@
 Burke, Subr, Ramamoorthy, "Action sequencing using visual permutations", RA-L 2021, Sec. V: at most 30 iterations.
 """
 
-from __future__ import annotations
-
 from neurosym.errors import InputError
 from neurosym.language.search_problem import Step
 from neurosym.planning.planner import PlannerTraits

@@ -20,7 +20,7 @@ from neurosym.geometry.stability.falls import find_falls
 from neurosym.language.problem import Problem
 from neurosym.pddl import gravity as pddl_gravity
 from neurosym.pddl.export import PddlTask, as_pddl, write_pddl
-from neurosym.pddl.names import RESERVED, Names
+from neurosym.pddl.facts import RESERVED, Names
 from neurosym.pipeline import count_orders
 
 pyperplan = pytest.importorskip("pyperplan.planner", reason="pyperplan is not installed: pip install '.[pddl]'")

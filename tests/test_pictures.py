@@ -134,7 +134,7 @@ def test_any_number_of_workers_draws_the_same(assembly: Assembly) -> None:
 
 
 def test_pictures_are_kept_and_found_again(assembly: Assembly, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    import neurosym.simulation.picture_cache as cache
+    import neurosym.simulation.render as cache
 
     monkeypatch.setenv("NEUROSYM_CACHE", str(tmp_path))
     assert cache_folder() == tmp_path

@@ -20,10 +20,10 @@ from neurosym.plotting import (
     scores_figure,
     search_figure,
 )
-from neurosym.plotting.labels import shortened
 from neurosym.plotting.layers import box_width, in_layers
 from neurosym.plotting.routes import bends, curve
 from neurosym.plotting.search import MOST_REFUSALS, ON_PLAN, REFUSED
+from neurosym.plotting.style import shortened
 from neurosym.testing.toys import NumberLine
 
 STOOL = {"seat": [(x, 0, 1) for x in range(3)], "left": [(0, 0, 0)], "right": [(2, 0, 0)]}

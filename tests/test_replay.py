@@ -29,12 +29,10 @@ from neurosym.geometry.step_motion import StepMotion, Track
 from neurosym.plan_files.reading import read_plan
 from neurosym.planning.staging import stage
 from neurosym.simulation import Physics, World, open_clients, replay_plan, replay_staging
-from neurosym.simulation.cutting import cut_into_convex
-from neurosym.simulation.decomposition import convex_pieces
+from neurosym.simulation.decomposition import convex_pieces, cut_into_convex
 from neurosym.simulation.looks import Camera
 from neurosym.simulation.solids import rigid_bodies
-from neurosym.simulation.window import Window
-from neurosym.simulation.world_window import WorldWindow
+from neurosym.simulation.window import Window, WorldWindow
 from neurosym.testing.burrs import burr
 
 BEAM = {"post": [(0, 0, 0)], "beam": [(0, 0, 1), (1, 0, 1)], "weight": [(0, 0, 2)]}

@@ -117,15 +117,15 @@ def test_a_world_is_put_back_exactly() -> None:
     with World(Assembly.from_cells(TOWER)) as world:
         world.remove("c")
         world.settle(60)
-        first, there = world.displacement(), world.bodies
+        first, there = world.displacement(), tuple(world.there)
         assert world.moved()
         world.restore(world.initial)
         assert world.moved() == {}
-        assert len(world.bodies) == 6
+        assert len(world.there) == 6
         world.remove("c")
         world.settle(60)
         assert world.displacement() == first
-        assert world.bodies == there
+        assert tuple(world.there) == there
         with pytest.raises(UnknownNameError):
             world.remove("c")
 

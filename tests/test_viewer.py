@@ -30,9 +30,8 @@ from neurosym.planning.staging import stage
 from neurosym.testing import burrs
 from neurosym.viewer import panels, score_table
 from neurosym.viewer.exhibit import Exhibit, Query, Search
-from neurosym.viewer.export import PAUSE, SECONDS_PER_STEP, _with_panel
+from neurosym.viewer.export import PAUSE, SECONDS_PER_STEP, _with_panel, follower
 from neurosym.viewer.facts import part_facts
-from neurosym.viewer.follow import follower
 from neurosym.viewer.planning import Planning, problem_maker
 from neurosym.viewer.solids import solids
 from neurosym.viewer.sources import open_source
@@ -839,7 +838,6 @@ def test_the_model_loads_no_viser():
         "solids",
         "panels",
         "steps",
-        "follow",
         "score_table",
         "planning",
         "sources",

@@ -83,11 +83,7 @@ class SearchOptions:
         return {"collapse": self.collapse, "before": before, "removed": self.removed or None}
 
     def own_cells(self) -> dict[str, Any] | None:
-        """The user's puzzle, {name: [[x, y, z], ...]}, if there is one.
-
-        Raises:
-            InputError: a file that has none.
-        """
+        """The user's puzzle, {name: [[x, y, z], ...]}, if there is one. Raises InputError: a file that has none."""
         if self.cells is None:
             return None
         expected = f'Expected JSON {{"name": [[x, y, z], ...]}} in {self.cells}; got'
@@ -212,11 +208,7 @@ class RemovalOptions:
 
 
 def load_assembly(path: Path, files: FileOptions) -> Assembly:
-    """The assembly in a file or folder.
-
-    Raises:
-        InputError: there is nothing at that path, or it cannot be used.
-    """
+    """The assembly in a file or folder. Raises InputError: there is nothing at that path, or it cannot be used."""
     if not path.exists():
         raise InputError(f"Expected a file or a folder with an assembly; there is nothing at {path}.")
     with progress_bar(f"reading {path.resolve().name}", after=1.0) as progress:
@@ -268,8 +260,7 @@ def taken_by(function: Callable[..., Any], options: Mapping[str, Any]) -> dict[s
 def progress_bar(what: str, after: float = 0.0) -> Iterator[Progress]:
     """A bar on stderr that goes away when it is done; nothing where stderr is no terminal.
 
-    Args:
-        after: seconds until it is shown.
+    `after`: seconds until it is shown.
     """
     if not sys.stderr.isatty():
         yield silent

@@ -9,23 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from neurosym.commands.common import (
-    AsJson,
-    CollapseRule,
-    DomainName,
-    FamilyOptions,
-    OracleName,
-    PictureStyle,
-    PriorNames,
-    Split,
-    console,
-    family_options,
-    print_json,
-    problem_options,
-    progress_bar,
-    say,
-    taken_by,
-)
+from neurosym.commands import common
 from neurosym.errors import InputError, UnknownNameError
 from neurosym.experiments.engines import cores
 from neurosym.language.problem_family import ProblemFamily
@@ -41,22 +25,22 @@ PARTS = ("test", "train", "all")
 
 
 def compare(
-    domain: DomainName,
+    domain: common.DomainName,
     problems: Annotated[
         str, typer.Option(metavar="test|train|all|N", help="Which; N means the first N of the test part.")
     ] = "test",
-    split: Split = 0,
-    pictures: PictureStyle = "clean",
+    split: common.Split = 0,
+    pictures: common.PictureStyle = "clean",
     planner: Annotated[list[str] | None, typer.Option(metavar="P", help="Name of a planner. May be repeated.")] = None,
-    prior: PriorNames = None,
-    collapse: CollapseRule = None,
-    option: FamilyOptions = None,
-    oracle: OracleName = "geometry",
+    prior: common.PriorNames = None,
+    collapse: common.CollapseRule = None,
+    option: common.FamilyOptions = None,
+    oracle: common.OracleName = "geometry",
     seeds: Annotated[int, typer.Option(min=1, metavar="K", help="Solve each problem K times.")] = 1,
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Folder for the table, the figure and the journal.")
     ] = None,
-    as_json: AsJson = False,
+    as_json: common.AsJson = False,
     workers: Annotated[int | None, typer.Option(min=1, metavar="N", help="Processes; default one a core.")] = None,
 ) -> None:
     """Compare planners and priors on a domain's problems: one row a planner and prior.
@@ -74,8 +58,8 @@ def compare(
     if out is not None and out.exists() and not out.is_dir():
         raise InputError(f"Expected --out to be a folder; {out} is a file.")
     family = load_domain(domain)
-    own = family_options(option)
-    only_numbers = taken_by(family.numbers, own).keys() - taken_by(family.problem, own).keys()
+    own = common.family_options(option)
+    only_numbers = common.taken_by(family.numbers, own).keys() - common.taken_by(family.problem, own).keys()
     of_problems = {k: v for k, v in own.items() if k not in only_numbers}
     folder = out if out is not None or as_json else Path("out") / f"compare-{domain}"
     processes = workers or cores()
@@ -86,12 +70,12 @@ def compare(
         numbers=_numbers(family, problems, split, own),
         planners=tuple(dict.fromkeys(planner or PLANNERS)),
         priors=tuple(dict.fromkeys(prior or PRIORS)),
-        options=problem_options(family, collapse=collapse, pictures=style) | of_problems,
+        options=common.problem_options(family, collapse=collapse, pictures=style) | of_problems,
         oracle=oracle,
         seeds=seeds,
     )
     comparison, scores = _scores(comparison, asked=bool(prior), workers=processes)
-    with progress_bar("planning") as progress:
+    with common.progress_bar("planning") as progress:
         journal = folder / "runs.jsonl" if folder else None
         runs = run(comparison, scores, workers=processes, journal=journal, progress=progress)
     outcome = Outcome(comparison, runs, *image_blind(comparison, split=split))
@@ -101,14 +85,14 @@ def compare(
         write_text(folder / "results.md", report(outcome))
         save(figure_of(outcome), folder / "iterations.png")
     if as_json:
-        print_json({"rows": table})
+        common.print_json({"rows": table})
         return
     _show(outcome, table, family, folder)
 
 
 def _numbers(family: ProblemFamily, problems: str, split: int, options: Mapping[str, Any]) -> tuple[int, ...]:
     # Which problems there are may depend on the options, too: a variant, how many tiles.
-    own = taken_by(family.numbers, options)
+    own = common.taken_by(family.numbers, options)
     if problems.isdecimal() and int(problems) > 0:
         test = tuple(family.numbers("test", split=split, **own))
         if int(problems) > len(test):
@@ -124,9 +108,9 @@ def _scores(comparison: Comparison, *, asked: bool, workers: int) -> tuple[Compa
     from neurosym.experiments.benchmark import ask_priors
 
     def leave_out(name: str, error: InputError) -> None:
-        say(f"Left out: the prior {name}. {error}")
+        common.say(f"Left out: the prior {name}. {error}")
 
-    with progress_bar("taking pictures") as progress:
+    with common.progress_bar("taking pictures") as progress:
         scores = ask_priors(comparison, workers=workers, leave_out=None if asked else leave_out, progress=progress)
     return dataclasses.replace(comparison, priors=tuple(scores)), scores
 
@@ -136,7 +120,7 @@ def _show(outcome: Outcome, given: list[Row], family: ProblemFamily, folder: Pat
 
     comparison = outcome.comparison
     rendered = table(given)
-    out = console(rendered)
+    out = common.console(rendered)
     options = ", ".join(f"{key} {value}" for key, value in comparison.options.items())
     seeds = f", {comparison.seeds} seeds each" if comparison.seeds > 1 else ""
     out.print(f"{comparison.domain}: {len(comparison.numbers)} problems{seeds}; {options}, oracle {comparison.oracle}")

@@ -1,7 +1,5 @@
 """`neurosym list` and `neurosym doctor`: what there is, whether it is ours, and whether it works."""
 
-from __future__ import annotations
-
 import importlib.util
 import platform
 import re
@@ -154,12 +152,12 @@ def pybullet_works() -> str:
 
     with Client() as client:
         p = client.p
-        p.setGravity(0, 0, -9.81, physicsClientId=client.id)
-        ball = p.createCollisionShape(p.GEOM_SPHERE, radius=0.1, physicsClientId=client.id)
-        body = p.createMultiBody(1.0, ball, basePosition=[0, 0, 10], physicsClientId=client.id)
+        p.setGravity(0, 0, -9.81)
+        ball = p.createCollisionShape(p.GEOM_SPHERE, radius=0.1)
+        body = p.createMultiBody(1.0, ball, basePosition=[0, 0, 10])
         for _ in range(24):
-            p.stepSimulation(physicsClientId=client.id)
-        fallen = 10 - p.getBasePositionAndOrientation(body, physicsClientId=client.id)[0][2]
+            p.stepSimulation()
+        fallen = 10 - p.getBasePositionAndOrientation(body)[0][2]
     if not 0.04 < fallen < 0.06:
         raise RuntimeError(f"a ball fell {fallen:g} m in 0.1 s; expected about 0.05")
     return f"a ball falls {100 * fallen:.1f} cm in 0.1 s"

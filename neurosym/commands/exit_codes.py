@@ -1,7 +1,5 @@
 """What `neurosym` says to the shell: every exit code, in one table, which a test walks through the real commands."""
 
-from __future__ import annotations
-
 from neurosym.planning.result import Status
 
 #: `doctor` found something amiss, or `replay` something that moved; also what typer leaves with when the reader of a
@@ -11,7 +9,6 @@ UNWELL = 1
 BAD_INPUT = 33
 #: Interrupted from the keyboard (128 + SIGINT, as shells count).
 INTERRUPTED = 130
-
 #: Exit code -> what it means.
 EXIT_CODES: dict[int, str] = {
     **{status.exit_code: status.sentence for status in Status},

@@ -8,18 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from neurosym.commands.common import (
-    DomainName,
-    FamilyOptions,
-    PictureStyle,
-    Split,
-    Style,
-    family_options,
-    progress_bar,
-    progress_bars,
-    say,
-    taken_by,
-)
+from neurosym.commands import common
 from neurosym.errors import InputError
 
 if TYPE_CHECKING:
@@ -27,18 +16,18 @@ if TYPE_CHECKING:
 
 
 def demos(
-    domain: DomainName,
+    domain: common.DomainName,
     out: Annotated[Path, typer.Option(metavar="FILE", help="Where to write them: a file in .npz.")],
     recipe: Annotated[str, typer.Option(metavar="full|paper", help="Which labels.")] = "full",
     part: Annotated[str, typer.Option(metavar="train|test|all", help="Of which problems.")] = "train",
-    split: Split = 0,
-    pictures: PictureStyle = "clean",
+    split: common.Split = 0,
+    pictures: common.PictureStyle = "clean",
     seed: Annotated[int, typer.Option(min=0, help="Of the pictures.")] = 0,
-    option: FamilyOptions = None,
+    option: common.FamilyOptions = None,
 ) -> None:
     """Write demonstrations of a domain: pictures, orders and shares of valid orders."""
     _check_suffix(out, ".npz")
-    made = _demonstrations(domain, part, split, recipe, pictures, seed, family_options(option))
+    made = _demonstrations(domain, part, split, recipe, pictures, seed, common.family_options(option))
     made.save(out)
     m, views, height, width, _ = made.pictures.shape
     shares = "with" if made.marginals is not None else "without"
@@ -47,21 +36,21 @@ def demos(
 
 
 def train(
-    domain: DomainName,
+    domain: common.DomainName,
     prior: Annotated[str, typer.Option(metavar="Q", help="sinkhorn, tcn, sinkhorn-paper or tcn-paper.")],
     out: Annotated[Path, typer.Option(metavar="FILE", help="The weights: a file in .safetensors.")],
     demos_file: Annotated[
         Path | None, typer.Option("--demos", metavar="FILE", help="Demonstrations of your own; default the domain's.")
     ] = None,
-    split: Split = 0,
+    split: common.Split = 0,
     seed: Annotated[int, typer.Option(min=0, metavar="K", help="Of the pictures and the training.")] = 0,
-    pictures: PictureStyle = "clean",
+    pictures: common.PictureStyle = "clean",
     epochs: Annotated[int | None, typer.Option(min=1, help="Default the recipe's.")] = None,
     encoder: Annotated[
         str | None, typer.Option(metavar="NAME", help="small (default) or paper, the paper's CNN.")
     ] = None,
     device: Annotated[str, typer.Option(help="cpu or cuda.")] = "cpu",
-    option: FamilyOptions = None,
+    option: common.FamilyOptions = None,
     resume: Annotated[bool, typer.Option("--resume/--no-resume", help="Go on from a run that was killed.")] = True,
 ) -> None:
     """Train a prior, with early figures; a run that was killed goes on where it was."""
@@ -80,15 +69,15 @@ def train(
         given = Demonstrations.load(demos_file)
     else:
         recipe = getattr(learner, "labels", "full")
-        given = _demonstrations(domain, "train", split, recipe, pictures, seed, family_options(option))
+        given = _demonstrations(domain, "train", split, recipe, pictures, seed, common.family_options(option))
     checkpoint = out.with_suffix(".checkpoint")
     if checkpoint.exists():
-        say(f"Going on from {checkpoint}." if resume else f"Starting over; {checkpoint} is replaced.")
+        common.say(f"Going on from {checkpoint}." if resume else f"Starting over; {checkpoint} is replaced.")
     out.parent.mkdir(parents=True, exist_ok=True)
     with warnings.catch_warnings():
-        warnings.showwarning = lambda message, *_, **__: say(f"Note: {message}")
+        warnings.showwarning = lambda message, *_, **__: common.say(f"Note: {message}")
         _fit(learner, given, seed=seed, epochs=epochs, device=device, checkpoint=checkpoint, resume=resume)
-    made_here = {"split": split, "pictures": pictures, "seed": seed, **family_options(option)}
+    made_here = {"split": split, "pictures": pictures, "seed": seed, **common.family_options(option)}
     learner.save(out, notes=made_here if demos_file is None else {"file": demos_file.name})
     checkpoint.unlink(missing_ok=True)
     figures = learner.header.get("training", {}) if hasattr(learner, "header") else {}
@@ -97,7 +86,7 @@ def train(
 
 
 def _fit(learner: Any, given: Demonstrations, **options: Any) -> None:
-    with progress_bars(transient=False) as bars:
+    with common.progress_bars(transient=False) as bars:
         task = bars.add_task("the first epoch", total=None)
 
         def show(now: Any) -> None:
@@ -108,21 +97,21 @@ def _fit(learner: Any, given: Demonstrations, **options: Any) -> None:
             bars.update(task, completed=now.epoch, total=now.epochs, description=text)
             # Where there is no terminal, a line at every tenth of the way.
             if bars.disable and (now.epoch * 10) // now.epochs > ((now.epoch - 1) * 10) // now.epochs:
-                say(f"epoch {now.epoch}/{now.epochs}: {text}")
+                common.say(f"epoch {now.epoch}/{now.epochs}: {text}")
 
         learner.fit(given, progress=show, **options)
 
 
 def _demonstrations(
-    domain: str, part: str, split: int, recipe: str, pictures: Style, seed: int, options: dict[str, Any]
+    domain: str, part: str, split: int, recipe: str, pictures: common.Style, seed: int, options: dict[str, Any]
 ) -> Demonstrations:
     from neurosym.registry import load_domain
 
     family = load_domain(domain)
-    strange = sorted(set(options) - set(taken_by(family.demonstrations, options)))
+    strange = sorted(set(options) - set(common.taken_by(family.demonstrations, options)))
     if strange:
         raise InputError(f"Expected options that demonstrations of {domain!r} take; got {', '.join(strange)}.")
-    with progress_bar("demonstrations") as progress:
+    with common.progress_bar("demonstrations") as progress:
         return family.demonstrations(
             part, split=split, recipe=recipe, style=pictures, seed=seed, progress=progress, **options
         )

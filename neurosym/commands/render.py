@@ -8,14 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from neurosym.commands.common import (
-    CollapseRule,
-    FamilyOptions,
-    FileOptions,
-    family_options,
-    load_assembly,
-    progress_bar,
-)
+from neurosym.commands import common
 from neurosym.errors import InputError
 
 if TYPE_CHECKING:
@@ -34,9 +27,9 @@ def render(
     number: Annotated[
         int | None, typer.Option("--problem", metavar="N", help="Number of the problem, where there is no plan.")
     ] = None,
-    option: FamilyOptions = None,
-    collapse: CollapseRule = None,
-    files: FileOptions,
+    option: common.FamilyOptions = None,
+    collapse: common.CollapseRule = None,
+    files: common.FileOptions,
     out: Annotated[
         Path | None, typer.Option(metavar="FILM", help="A film of the plan: .gif, .mp4 (extra `video`), or a folder.")
     ] = None,
@@ -80,19 +73,19 @@ def render(
     if size is not None:
         width, height = _two(size, r"(\d{2,4})x(\d{2,4})", "--size WxH, as 640x480")
         film_size = still_size = (int(width), int(height))
-    staging, title = _staging(what, plan, number, files, {"collapse": collapse, **family_options(option)})
+    staging, title = _staging(what, plan, number, files, {"collapse": collapse, **common.family_options(option)})
     if exploded is not None:
         picture = exploded_view(staging, spread=spread, size=still_size, camera=camera, title=title)
         print(f"{still(picture, exploded)}: {title}, {len(staging.assembly)} parts pulled apart.")
     if out is not None:
-        with progress_bar("pictures") as progress:
+        with common.progress_bar("pictures") as progress:
             film = frames(staging, title=title, size=film_size, camera=camera, progress=progress)
             write_film(film, out)
         print(f"{out}: {title}, {len(staging.motions)} steps.")
 
 
 def _staging(
-    what: str, plan: Path | None, number: int | None, files: FileOptions, options: dict[str, Any]
+    what: str, plan: Path | None, number: int | None, files: common.FileOptions, options: dict[str, Any]
 ) -> tuple[Staging, str]:
     from neurosym.plan_files.reading import read_plan
     from neurosym.planning.staging import stage
@@ -109,14 +102,14 @@ def _staging(
     return stage(saved.problem, saved.plan, saved.motions), saved.problem.name
 
 
-def _at_rest(what: str, number: int | None, files: FileOptions, options: dict[str, Any]) -> tuple[Staging, str]:
+def _at_rest(what: str, number: int | None, files: common.FileOptions, options: dict[str, Any]) -> tuple[Staging, str]:
     """The assembly alone."""
     from neurosym.geometry.assembly import Assembly
     from neurosym.geometry.staging import Staging
     from neurosym.registry import domain_names, load_domain
 
     if what not in domain_names() and Path(what).exists():
-        world, name = load_assembly(Path(what), files), Path(what).resolve().name
+        world, name = common.load_assembly(Path(what), files), Path(what).resolve().name
     else:
         files.reading().refuse(f"{what!r} is a problem family")
         problem = load_domain(what).problem(number or 0, **options)

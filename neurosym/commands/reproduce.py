@@ -1,7 +1,5 @@
 """`neurosym reproduce` and `neurosym results`: rebuild the paper's experiments, and put their reports on one page."""
 
-from __future__ import annotations
-
 import os
 import sys
 from contextlib import redirect_stdout

@@ -3,8 +3,6 @@
 A command takes such a dataclass as one parameter. On the command line, and in `--help`, its fields stand in its place.
 """
 
-from __future__ import annotations
-
 import functools
 import inspect
 from collections.abc import Callable

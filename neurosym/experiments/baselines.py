@@ -3,23 +3,19 @@
 A prior that looks must beat them. They are calculated, not trained.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Hashable, Mapping, Sequence
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from neurosym.experiments.order_accuracy import classes_at, classes_of, seen_in
 from neurosym.language.demonstrations import Demonstrations
 from neurosym.language.search_problem import Rejection, SearchProblem
+from neurosym.support.arrays import Array
 
 #: As `compare_orders` gives them: metric -> float64 (M,), a value a test picture.
-Figures = dict[str, NDArray[np.float64]]
-
+Figures = dict[str, Array]
 #: Questions to the oracle after which the search for the best fixed order stops with the best it has.
 MAX_ATTEMPTS = 2_000_000
 
@@ -69,9 +65,7 @@ def blind(train: Demonstrations, test: Demonstrations) -> Figures:
 
 
 #: By their names in tables.
-BASELINES: Mapping[str, Callable[[Demonstrations, Demonstrations], Figures]] = MappingProxyType(
-    {"memoriser": memoriser, "blind": blind}
-)
+BASELINES: Mapping[str, Callable[[Demonstrations, Demonstrations], Figures]] = {"memoriser": memoriser, "blind": blind}
 
 
 def order_fails(search: SearchProblem[Any], order: Sequence[int]) -> bool:

@@ -4,8 +4,6 @@ A task's answer must depend on the task alone; then it is the same on every engi
 same number of threads, too: worker processes and Ray's have one, and what runs in this process has what it was given.
 """
 
-from __future__ import annotations
-
 import os
 import socket
 from collections import deque
@@ -18,13 +16,10 @@ from neurosym.errors import ContractError, InputError, MissingDependencyError, N
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
-
 #: Names of engines.
 ENGINES = ("local", "ray")
-
 #: How often Ray runs a task again whose node or process was lost, or that failed on its machine (no memory, no disk).
 RETRIES = 5
-
 #: A cluster that does not answer within so many seconds is not there. Ray itself would end the process, in two minutes.
 REACH_SECONDS = 5.0
 

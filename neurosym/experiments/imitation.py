@@ -4,8 +4,6 @@ A study is a grid of trials (pictures x method x n x seed). Each trains one netw
 its own orders (`predict`) with those of pictures it never saw. Finished trials are kept in a journal.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import asdict
 from functools import cache
@@ -25,7 +23,6 @@ from neurosym.language.problem_family import Progress
 from neurosym.registry import load_domain, load_prior
 
 __all__ = ["Results", "Study", "Trial", "report", "reproduce_study", "run_trial", "study", "study_names"]
-
 #: Raise it whenever the same trial would give other figures, so that no journal answers for it.
 TRIALS_VERSION = 4
 
@@ -41,11 +38,8 @@ def reproduce_study(
 ) -> Results:
     """Run the trials that are not done yet; write results.csv, report.md and figures into `out`.
 
-    Args:
-        epochs: None takes each recipe's.
-        say: called with a line about what is going on.
-        progress: called with (done, total) trials.
-        where: workers, engine and address: where trials run, see `neurosym.experiments.engines.run_tasks`.
+    `epochs`: None takes each recipe's. `say`: called with a line about what is going on. `progress`: called with (done,
+    total) trials. `where`: workers, engine and address: where trials run, see `neurosym.experiments.engines.run_tasks`.
     """
     journal = Journal(out / "trials.jsonl")
     keys = {trial: _key(given, trial, epochs) for trial in given.trials()}
@@ -69,9 +63,8 @@ def reproduce_study(
 def run_trial(trial: Trial, given: Study, epochs: int | None = None) -> dict[str, Any]:
     """Train and test one network, or calculate a baseline.
 
-    Returns:
-        What a journal keeps: ``"figures"``, metric -> mean over the test pictures, and ``"counts"``, as
-        `Counts.to_json` gives them (None for a baseline).
+    Returns what a journal keeps: ``"figures"``, metric -> mean over the test pictures, and ``"counts"``, as
+    `Counts.to_json` gives them (None for a baseline).
     """
     family = load_domain(given.domain)
     name, changes = given.training(trial.method)

@@ -1,7 +1,5 @@
 """A journal of finished work: JSON lines, each a key and a value, appended whole; a torn last line is ignored."""
 
-from __future__ import annotations
-
 import contextlib
 import hashlib
 import json
@@ -20,8 +18,7 @@ def key_of(configuration: Any) -> str:
 class Journal:
     """Finished results by key. With a path of None it remembers nothing.
 
-    Args:
-        path: the file; made, with its folder, at the first `add`.
+    `path`: the file; made, with its folder, at the first `add`.
     """
 
     def __init__(self, path: str | Path | None) -> None:

@@ -1,24 +1,19 @@
 """How well orders read from pictures agree with demonstrated ones: shares for tables, counts for figures."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from neurosym.errors import InputError
 from neurosym.language.demonstrations import Demonstrations
+from neurosym.support.arrays import Array, Numbers, Truths
 
-Ints = NDArray[np.int64]
 
-
-def compare_orders(
-    predicted: ArrayLike, truth: Demonstrations, classes: Sequence[int]
-) -> dict[str, NDArray[np.float64]]:
+def compare_orders(predicted: ArrayLike, truth: Demonstrations, classes: Sequence[int]) -> dict[str, Array]:
     """How well orders agree with demonstrated ones, where interchangeable actions count as one.
 
     Args:
@@ -43,7 +38,7 @@ def compare_orders(
     }
 
 
-def classes_at(orders: Ints, classes: Sequence[int]) -> Ints:
+def classes_at(orders: Numbers, classes: Sequence[int]) -> Numbers:
     """int64 (M, T): the class of the action at each step; -1 where there is none."""
     # Index -1, no action, takes the last entry.
     return np.asarray(np.append(np.asarray(classes, dtype=np.int64), -1)[orders])
@@ -54,18 +49,16 @@ def classes_of(given: Demonstrations) -> tuple[int, ...]:
     return tuple(int(c) for c in np.unique(given.classes or range(len(given.actions)), return_inverse=True)[1])
 
 
-def seen_in(train: Demonstrations, test: Demonstrations) -> NDArray[np.bool_]:
+def seen_in(train: Demonstrations, test: Demonstrations) -> Truths:
     """bool (M,): which test sequences, of classes, are among those of the training."""
     known = {row.tobytes() for row in classes_at(train.sequences, classes_of(train))}
     return np.array([row.tobytes() in known for row in classes_at(test.sequences, classes_of(test))])
 
 
-def averages(figures: Mapping[str, NDArray[np.float64]], seen: NDArray[np.bool_]) -> dict[str, float]:
+def averages(figures: Mapping[str, Array], seen: Truths) -> dict[str, float]:
     """Means over all pictures, and of `whole_sequence` and `per_step` over those seen in training and not, apart.
 
-    Args:
-        figures: metric -> float64 (M,).
-        seen: bool (M,).
+    `figures`: metric -> float64 (M,). `seen`: bool (M,).
     """
     means = {metric: float(values.mean()) for metric, values in figures.items()}
     for label, chosen in (("seen", seen), ("unseen", ~seen)):
@@ -91,12 +84,12 @@ class Counts:
 
     labels: tuple[str, ...]
     members: tuple[int, ...]
-    confusion: Ints
-    right: Ints
-    repeats: Ints
+    confusion: Numbers
+    right: Numbers
+    repeats: Numbers
 
     @classmethod
-    def of(cls, predicted: ArrayLike, truth: Demonstrations) -> Counts:
+    def of(cls, predicted: ArrayLike, truth: Demonstrations) -> Self:
         """Count orders, int (M, T), against the demonstrated ones."""
         order, classes = _checked(predicted, truth), classes_of(truth)
         labels = _class_names(truth.actions, classes)
@@ -115,7 +108,7 @@ class Counts:
         return cls(labels, tuple(int(n) for n in np.bincount(classes, minlength=k)), confusion, right, repeats)
 
     @classmethod
-    def pooled(cls, trials: Sequence[Counts]) -> Counts:
+    def pooled(cls, trials: Sequence[Self]) -> Self:
         """Those of several trials, added up."""
         if len({(c.labels, c.members, c.right.shape) for c in trials}) > 1:
             raise InputError("Expected counts of the same classes and steps to add up; got different ones.")
@@ -126,12 +119,12 @@ class Counts:
         return {name: np.asarray(value).tolist() for name, value in vars(self).items()}
 
     @classmethod
-    def from_json(cls, given: Mapping[str, Any]) -> Counts:
+    def from_json(cls, given: Mapping[str, Any]) -> Self:
         arrays = (np.array(given[name], dtype=np.int64) for name in ("confusion", "right", "repeats"))
         return cls(tuple(given["labels"]), tuple(given["members"]), *arrays)
 
 
-def _checked(predicted: ArrayLike, truth: Demonstrations) -> Ints:
+def _checked(predicted: ArrayLike, truth: Demonstrations) -> Numbers:
     order = np.asarray(predicted, dtype=np.int64)
     if order.shape != truth.sequences.shape:
         raise InputError(f"Expected predicted orders of shape {truth.sequences.shape}; got {order.shape}.")

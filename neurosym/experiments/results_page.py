@@ -1,7 +1,5 @@
 """One page of the results of many experiments, made from the reports and figures that their runs left behind."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,7 +11,6 @@ from neurosym.support.files import replacing, write_text
 LARGEST = 60_000
 #: Colours that a figure is reduced to, the first number with which it is small enough.
 PALETTES = (256, 128, 64, 32)
-
 #: The paper's experiments as the paper has them; others come after, by name.
 ORDER = ("tower", "tower-easy", "tower-by-sequence", "unseen", "variable", "soma", "soma-published", "scrabble")
 
@@ -28,12 +25,8 @@ _INTRODUCTION = (
 def write_results_page(folders: Sequence[Path], to: Path) -> Path:
     """Write the page `to`, a section a folder in the order given, and copy its figures to ``figures/`` beside it.
 
-    Args:
-        folders: of `neurosym reproduce`; each has a report.md.
-        to: the page, Markdown.
-
-    Raises:
-        InputError: no folder, one without a report or without a figure that its report shows, or two of one name.
+    `folders`: of `neurosym reproduce`; each has a report.md. `to`: the page, Markdown. Raises InputError: no folder,
+    one without a report or without a figure that its report shows, or two of one name.
     """
     if not folders:
         raise InputError("Expected at least one folder of `neurosym reproduce`; got none. Run one, or name it.")

@@ -1,7 +1,5 @@
 """Action schemas: what an action needs and what it changes, over typed parameters."""
 
-from __future__ import annotations
-
 import string
 from collections.abc import Sequence
 
@@ -87,8 +85,7 @@ class Action:
 def moved_parts(effects: Sequence[Literal], names: Sequence[str]) -> tuple[tuple[str, ...], bool]:
     """Which of some names leave, by effects that only delete atoms of them; else which arrive, by such that only add.
 
-    Returns:
-        the names, and whether they arrive.
+    Returns the names, and whether they arrive.
     """
     added, deleted = ({a for e in effects if e.positive is sign for a in e.atom.args} for sign in (True, False))
     leaving = tuple(name for name in names if name in deleted - added)

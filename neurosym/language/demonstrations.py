@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from neurosym.errors import DemonstrationError
+from neurosym.support.arrays import Numbers, Pixels
 from neurosym.support.files import replacing
 
 SCHEMA = 1
@@ -26,20 +27,19 @@ class Demonstrations:
         pictures: uint8 (M, V, H, W, 3).
         sequences: int64 (M, T): indices of actions, in order; shorter ones are padded with -1 at the end.
         actions: the N action names.
-        marginals: float32 (M, T, N) or None: soft targets, the share of all valid orders with each action at
-            each step; rows sum to one.
-        groups: int64 (M,): demonstrations of one group show one problem (turned, lit anew) and are held out
-            together; default: each its own.
+        marginals: float32 (M, T, N) or None: soft targets, the share of all valid orders with each action at each step;
+            rows sum to one.
+        groups: int64 (M,): demonstrations of one group show one problem (turned, lit anew) and are held out together;
+            default: each its own.
         domain: the family's name, or "".
-        classes: one integer an action, or empty; actions of one class are interchangeable: swapping two of them
-            leaves the whole problem as it was. Empty: each is its own.
+        classes: one integer an action; those of one class are interchangeable. Empty: each is its own.
     """
 
-    pictures: NDArray[np.uint8]
-    sequences: NDArray[np.int64]
+    pictures: Pixels
+    sequences: Numbers
     actions: tuple[str, ...]
     marginals: NDArray[np.float32] | None = None
-    groups: NDArray[np.int64] | None = None
+    groups: Numbers | None = None
     domain: str = ""
     classes: tuple[int, ...] = ()
 
@@ -72,9 +72,9 @@ class Demonstrations:
         return len(self.pictures)
 
     @property
-    def lengths(self) -> NDArray[np.int64]:
+    def lengths(self) -> Numbers:
         """int64 (M,): how many steps each order has."""
-        lengths: NDArray[np.int64] = (self.sequences >= 0).sum(axis=1)
+        lengths: Numbers = (self.sequences >= 0).sum(axis=1)
         return lengths
 
     def subset(self, index: ArrayLike) -> Demonstrations:
@@ -139,7 +139,7 @@ class Demonstrations:
         )
 
 
-def _checked_sequences(given: ArrayLike, m: int, actions: tuple[str, ...]) -> NDArray[np.int64]:
+def _checked_sequences(given: ArrayLike, m: int, actions: tuple[str, ...]) -> Numbers:
     sequences = np.asarray(given)
     n = len(actions)
     if sequences.ndim != 2 or len(sequences) != m or not np.issubdtype(sequences.dtype, np.integer):

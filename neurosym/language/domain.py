@@ -1,7 +1,5 @@
 """Domains: fluents and actions, checked at once, with the place of every mistake named."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -17,8 +15,7 @@ from neurosym.language.terms import Atom, Condition, Derived, Fluent, Type, as_l
 class Domain:
     """A symbolic domain: fluents and actions. ``domain.problem(...)`` makes problems of it.
 
-    Raises:
-        DefinitionError: two fluents or actions of one name, or an action over a fluent that is not declared.
+    Raises DefinitionError: two fluents or actions of one name, or an action over a fluent that is not declared.
     """
 
     def __init__(self, name: str, *, fluents: Sequence[Fluent], actions: Sequence[Action]) -> None:
@@ -67,15 +64,13 @@ class Domain:
                 and several problems share what it knows.
             before: pairs (a, b) of names of action primitives: b may be done only after a.
             interchangeable: groups of names of action primitives that may be swapped for one another.
-            name: for messages and files.
             family: the name of the problem family, by which priors find their weights.
             details: whatever the family wants to remember.
             simulation: how a physics oracle would judge it.
             semantics: what symbols cannot say of it: pictures, parts in space, a search of its own.
 
         Raises:
-            DefinitionError: with the place of the mistake: an unknown object, a wrong type, a goal that no
-                action can reach, precedence in a circle.
+            DefinitionError: an unknown object, a wrong type, a goal that no action can reach, precedence in a circle.
         """
         place = f"problem {name!r}"
         geometry = AssemblyGeometry.of(world) if isinstance(world, Assembly | AssemblyGeometry) else None

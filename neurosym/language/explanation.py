@@ -3,8 +3,6 @@
 `explain` looks at one set of parts at which a search got stuck: nothing of it could be taken out.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -60,7 +58,7 @@ class WhyNot:
 
     Attributes:
         after: names of the actions after which the search got stuck: the longest prefix that works.
-        left: names of the parts that are there still, those among them that never leave included.
+        left: names of the parts that are there still, those that never leave included.
         blocked: for every part that is blocked in each direction, one entry a direction.
         cycle: the smallest cycle of parts that block one another along one direction; None where there is none,
             because all that is blocked is blocked by what never leaves.

@@ -4,8 +4,6 @@ A verdict answers for one state; a formula speaks of all states at once, so that
 programs that cannot ask geometry (`neurosym.pddl.export`). `Derived.formula` gives one; it may be None.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from neurosym.language.terms import Fluent, Literal
@@ -15,8 +13,7 @@ from neurosym.language.terms import Fluent, Literal
 class Way:
     """One way in which a predicate holds: all these literals do.
 
-    Attributes:
-        name: in words, for instance a direction; may be empty.
+    `name`: in words, for instance a direction; may be empty.
     """
 
     name: str
@@ -36,10 +33,8 @@ class Stands:
 
     There is no formula of bounded size for it: equilibrium is a linear program.
 
-    Attributes:
-        present: the fluent of one part that says which parts are there.
-        without: the part that is left out.
-        held: how many may be held.
+    `present`: the fluent of one part that says which parts are there. `without`: the part that is left out. `held`: how
+    many may be held.
     """
 
     present: Fluent

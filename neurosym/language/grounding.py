@@ -93,11 +93,7 @@ class GroundProblem:
 
     def candidates(self, state: int) -> list[int]:
         """Indices of the actions whose fluents allow them in `state`."""
-        return [
-            i
-            for i, (pos, neg) in enumerate(zip(self._pos, self._neg))
-            if (state & pos) == pos and not state & neg
-        ]
+        return [i for i, (pos, neg) in enumerate(zip(self._pos, self._neg)) if (state & pos) == pos and not state & neg]
 
     def is_applicable(self, state: int, action: int) -> bool:
         """Whether `action` is one of the candidates in `state`."""

@@ -57,8 +57,7 @@ def reachable_instances(initial: set[Atom], instances: Sequence[Instance]) -> li
             i
             for i in waiting
             if all(
-                p.atom in true if p.positive else p.atom not in initial or p.atom in untrue_possible
-                for p in i.fluents
+                p.atom in true if p.positive else p.atom not in initial or p.atom in untrue_possible for p in i.fluents
             )
         ]
         if not now:

@@ -1,7 +1,5 @@
 """Options of functions that make problems: which there are, and a refusal, by name, of those that there are not."""
 
-from __future__ import annotations
-
 import inspect
 import json
 from collections.abc import Callable, Iterable, Mapping
@@ -28,8 +26,7 @@ def options_of(make: Callable[..., Any]) -> dict[str, Any] | None:
 def check_options(make: Callable[..., Any], given: Iterable[str], whose: str) -> None:
     """Refuse names of options that a function does not take.
 
-    Raises:
-        InputError: there are such; the message has those that it takes.
+    Raises InputError: there are such; the message has those that it takes.
     """
     known = options_of(make)
     wrong = [] if known is None else [name for name in given if name not in known]
@@ -39,11 +36,7 @@ def check_options(make: Callable[..., Any], given: Iterable[str], whose: str) ->
 
 
 def made(make: Callable[..., T], *given: Any, options: Mapping[str, Any], whose: str) -> T:
-    """What a function makes of options.
-
-    Raises:
-        InputError: options that it does not take, together or at all.
-    """
+    """What a function makes of options. Raises InputError: options that it does not take, together or at all."""
     check_options(make, options, whose)
     try:
         return make(*given, **options)
@@ -54,8 +47,7 @@ def made(make: Callable[..., T], *given: Any, options: Mapping[str, Any], whose:
 def read_options(texts: Iterable[str], expected: str) -> dict[str, Any]:
     """Options that somebody typed as ``key=value``: a value that is JSON is read as such, anything else is text.
 
-    Raises:
-        InputError: a text is something else; the message says what was `expected`.
+    Raises InputError: a text is something else; the message says what was `expected`.
     """
     options: dict[str, Any] = {}
     for text in texts:

@@ -28,9 +28,7 @@ from neurosym.support.bitsets import bits
 from neurosym.support.words import listed
 
 
-def free(
-    present: Fluent, *, directions: ArrayLike | None = None, table: bool = True, removal: bool = True
-) -> Derived:
+def free(present: Fluent, *, directions: ArrayLike | None = None, table: bool = True, removal: bool = True) -> Derived:
     """``free(p)``: part p can leave by one straight translation, past the parts present and the table.
 
     Args:

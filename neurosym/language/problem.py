@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 from typing import Literal as OneOf
 
 import numpy as np
-from numpy.typing import NDArray
 
 from neurosym.errors import DefinitionError, InputError, UnknownNameError
 from neurosym.geometry.queries import AssemblyGeometry
 from neurosym.language.actions import Action
 from neurosym.language.semantics import Semantics
 from neurosym.language.terms import Atom, Derived, Literal, Type, Variable
+from neurosym.support.arrays import Pixels
 
 if TYPE_CHECKING:
     from neurosym.language.domain import Domain
@@ -47,9 +47,8 @@ class Simulation:
 class Problem:
     """A problem: a domain, a world, and what holds at first and at last. Made by `Domain.problem`.
 
-    Attributes:
-        world: whatever the domain is about, for instance an `Assembly`.
-        geometry: the object that answers questions about a world that is an `Assembly`; None for others.
+    `world`: whatever the domain is about, for instance an `Assembly`. `geometry`: the object that answers questions
+    about a world that is an `Assembly`; None for others.
     """
 
     domain: Domain
@@ -64,7 +63,7 @@ class Problem:
     details: Mapping[str, Any] = field(default_factory=dict)
     simulation: Simulation | None = None
     semantics: Semantics = field(default_factory=Semantics)
-    pictures: NDArray[np.uint8] | None = None
+    pictures: Pixels | None = None
     geometry: AssemblyGeometry | None = None
 
     def __post_init__(self) -> None:
@@ -163,11 +162,11 @@ class Problem:
         return self.symbols.classes
 
     @cached_property
-    def observation(self) -> NDArray[np.uint8] | None:
+    def observation(self) -> Pixels | None:
         """The pictures, uint8 (V, H, W, 3), taken when first asked for; None when there are none."""
         return self.semantics.observe(self) if self.pictures is None else self.pictures
 
-    def with_pictures(self, pictures: NDArray[np.uint8]) -> Problem:
+    def with_pictures(self, pictures: Pixels) -> Problem:
         """The same problem behind other pictures."""
         array = np.asarray(pictures)
         if array.dtype != np.uint8 or array.ndim != 4 or array.shape[-1] != 3:

@@ -7,9 +7,9 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from neurosym.language.semantics import Semantics
+from neurosym.support.arrays import Pixels
 from neurosym.support.progress import Progress as Progress
 
 if TYPE_CHECKING:
@@ -22,8 +22,6 @@ class ProblemFamily(Semantics, ABC):
     """What an entry point in ``neurosym.domains`` names.
 
     Attributes:
-        name: the name it is registered under.
-        domain: the symbols.
         reference: where the task and its numbers come from.
         published: rows of published figures, shown beside ours by `compare`.
     """
@@ -45,28 +43,33 @@ class ProblemFamily(Semantics, ABC):
         """Numbers of the problems of a part, as `problem` takes them; benchmarks rebuild problems from these."""
         raise NotImplementedError(f"the domain {self.name!r} does not number its problems")
 
-    def pictures(
-        self, problem: Problem, *, style: str = "clean", rng: np.random.Generator | None = None
-    ) -> NDArray[np.uint8]:
+    def pictures(self, problem: Problem, *, style: str = "clean", rng: np.random.Generator | None = None) -> Pixels:
         """Pictures of the finished work, uint8 (V, H, W, 3)."""
         raise NotImplementedError(f"the domain {self.name!r} has no pictures")
+
+    def observe(self, problem: Problem) -> Pixels | None:
+        """The pictures that a problem's details ask for, by their style and seed; None where they ask for none."""
+        details = problem.details
+        if not {"pictures", "seed"} <= set(details):
+            return None
+        return self.pictures(problem, style=details["pictures"], rng=np.random.default_rng(details["seed"]))
 
     def observed(
         self, problems: Sequence[Problem], *, workers: int = 1, progress: Progress | None = None
     ) -> list[Problem]:
         """The same problems with their pictures taken, all of a style in one go (`take_pictures`)."""
-        found = list(problems)
+        seen = list(problems)
         for style in sorted({str(p.details.get("pictures")) for p in problems}):
             chosen = [i for i, p in enumerate(problems) if str(p.details.get("pictures")) == style]
             own = [problems[i] for i in chosen]
             views = self.take_pictures(own, style=style, workers=workers, progress=progress)
             for i, view in zip(chosen, () if views is None else views):
-                found[i] = problems[i].with_pictures(view)
-        return found
+                seen[i] = problems[i].with_pictures(view)
+        return seen
 
     def take_pictures(
         self, problems: Sequence[Problem], *, style: str, workers: int = 1, progress: Progress | None = None
-    ) -> NDArray[np.uint8] | None:
+    ) -> Pixels | None:
         """Pictures of many problems of one style, uint8 (M, V, H, W, 3): those that each would take by itself.
 
         None, the default, leaves it to the problems.

@@ -23,12 +23,11 @@ class Verdict:
     """The answer of a predicate, with its evidence. Truthy exactly when it holds.
 
     Attributes:
-        holds: the answer.
         because: names of the objects that decided it.
         reason: one sentence for a person.
-        until: a promise, for a verdict that does not hold: it will not hold in any later state
-            until one of these ground atoms changes. `None` promises nothing; an empty tuple promises
-            that it never will. Planners learn from it, so it must be sound.
+        until: a promise, for a verdict that does not hold: it will not hold in any later state until one of these
+            ground atoms changes. `None` promises nothing, an empty tuple that it never will. Planners learn from it,
+            so it must be sound.
         unconditional: a stronger promise: the verdict does not depend on the rest of the state. It does not hold in
             any state in which the atoms of `until` are as they are now, whether or not it comes after this one.
         decided_by: the same promise for a state from which atoms may change either way, which a search from the goal
@@ -67,10 +66,9 @@ class Rejection:
 
     Attributes:
         reason: one sentence for a person.
-        because: names of the objects that decided it.
-        until: indices of actions. A promise: the action stays refused in every state reached from this
-            one until one of these is done. Empty promises nothing. An action that can never succeed
-            names itself. Planners prune by it, so it must be sound.
+        until: indices of actions. A promise: the action stays refused in every state reached from this one until one
+            of these is done. Empty promises nothing. An action that can never succeed names itself. Planners prune by
+            it, so it must be sound.
         unconditional: the promise holds in every state of the problem before one of `until` is done, not only in
             those reached from this one: what was learned in one branch of a search serves in all.
         given: indices of actions. An unconditional promise holds in those states alone in which all these are done.
@@ -114,10 +112,9 @@ class SearchProblem(Protocol[S]):
     gives the `SearchProblem` from there (`neurosym.language.reversal`).
 
     Attributes:
-        actions: names of the N action primitives, in the order in which priors score them. Each can be
-            used once in a plan; the planner, not the state, remembers which were used.
-        classes: one integer an action; actions of one class are interchangeable: swapping two of them
-            leaves the whole problem as it was.
+        actions: names of the N action primitives, in the order in which priors score them. Each can be used once in a
+            plan; the planner, not the state, remembers which were used.
+        classes: one integer an action; swapping two actions of one class leaves the whole problem as it was.
         initial: the state to start from (hashable and small).
     """
 

@@ -6,22 +6,17 @@ planner's plan, read back by `PddlTask.order`, passes `neurosym.validate`, and w
 sequence of PDDL actions is not one to one an order, for a part that can leave in two ways has two actions.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from neurosym.errors import InputError, UnknownNameError
+from neurosym.language.problem import Problem
 from neurosym.language.terms import Type
-from neurosym.pddl.names import Names
-from neurosym.pddl.strips import Fact, Mark, Strips, strips
+from neurosym.pddl.facts import Fact, Mark, Names, Strips
+from neurosym.pddl.strips import strips
 from neurosym.support.files import write_text
-
-if TYPE_CHECKING:
-    from neurosym.language.problem import Problem
 
 #: Time for what has to be searched: the falls under gravity, or the states of a domain without formulas (seconds).
 SECONDS = 60.0
@@ -48,8 +43,7 @@ class PddlTask:
     def order(self, plan: str | Iterable[str]) -> tuple[str, ...]:
         """Names of action primitives, from a planner's plan: names of PDDL actions, or a plan file's text.
 
-        Raises:
-            UnknownNameError: a name that is no action of the domain file.
+        Raises UnknownNameError: a name that is no action of the domain file.
         """
         lines = plan.splitlines() if isinstance(plan, str) else plan
         names = (line.partition(";")[0].strip().strip("()").strip().lower() for line in lines)
@@ -76,9 +70,7 @@ def write_pddl(problem: Problem, directory: str | Path, *, seconds: float | None
     return as_pddl(problem, seconds=seconds).write(directory)
 
 
-def as_pddl(
-    problem: Problem, *, seconds: float | None = SECONDS, refuted: Sequence[Sequence[str]] = ()
-) -> PddlTask:
+def as_pddl(problem: Problem, *, seconds: float | None = SECONDS, refuted: Sequence[Sequence[str]] = ()) -> PddlTask:
     """A problem in PDDL.
 
     Args:
@@ -125,18 +117,18 @@ class _Writer:
 
     def _notes(self) -> tuple[str, ...]:
         if self.compiled.sound:
-            said = "Exact: an order of removal is a plan here exactly when it is one for neurosym."
+            scope = "Exact: an order of removal is a plan here exactly when it is one for neurosym."
         else:
-            said = "Not all falls are known: every valid order is a plan here, but replay what a planner finds."
-        return (*self.compiled.notes, said if self.compiled.operators else "No action can ever be done.")
+            scope = "Not all falls are known: every valid order is a plan here, but replay what a planner finds."
+        return (*self.compiled.notes, scope if self.compiled.operators else "No action can ever be done.")
 
     def _domain(self) -> Iterator[str]:
-        yield f"; {_quoted(self.given.name)}, written by neurosym."
+        yield f"; {json.dumps(self.given.name)}, written by neurosym."
         yield from (f"; {note}" for note in self._notes())
         renamed = [(old, new) for old, new in self.objects.items() if old != new]
         if renamed:
             yield "; Names that PDDL does not allow:"
-            yield from (f";   {new} is {_quoted(old)}" for old, new in renamed)
+            yield from (f";   {new} is {json.dumps(old)}" for old, new in renamed)
         yield f"(define (domain {self.title})"
         yield "  (:requirements :strips :typing)"
         yield "  (:types"
@@ -153,8 +145,8 @@ class _Writer:
         for operator in self.compiled.operators:
             name = self.names.fresh(" ".join(filter(None, (operator.name, operator.how))))
             self.actions[name] = operator.action
-            said = "a note" if operator.action is None else _quoted(operator.action)
-            yield f"  (:action {name} ; {' '.join(filter(None, (said, operator.how)))}"
+            what = "a note" if operator.action is None else json.dumps(operator.action)
+            yield f"  (:action {name} ; {' '.join(filter(None, (what, operator.how)))}"
             yield "    :parameters ()"
             yield f"    :precondition {self._and(operator.pre)}"
             removed = [f"(not {f})" for f in self._sorted(operator.delete)]
@@ -162,7 +154,7 @@ class _Writer:
         yield ")"
 
     def _problem(self) -> Iterator[str]:
-        yield f"; {_quoted(self.given.name)}, written by neurosym. See the domain's file for what it says."
+        yield f"; {json.dumps(self.given.name)}, written by neurosym. See the domain's file for what it says."
         yield f"(define (problem {self.names.fresh(self.given.name)})"
         yield f"  (:domain {self.title})"
         yield "  (:init"
@@ -186,20 +178,16 @@ class _Writer:
 
 def _types(problem: Problem) -> list[Type]:
     """All types, parents first."""
-    found: dict[Type, None] = {}
+    types: dict[Type, None] = {}
 
     def add(kind: Type) -> None:
         if kind.parent is not None:
             add(kind.parent)
-        found[kind] = None
+        types[kind] = None
 
     for kind in (*problem.objects, *(k for f in problem.domain.fluents for k in f.types)):
         add(kind)
-    return list(found)
-
-
-def _quoted(text: str) -> str:
-    return json.dumps(text)
+    return list(types)
 
 
 __all__ = ["PddlTask", "as_pddl", "write_pddl"]

@@ -4,22 +4,17 @@ The falls are a finite list (`neurosym.geometry.stability.falls`). Each happens 
 and what would resist is gone; so a part of it must have left, or one that resists must still be there.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
+from neurosym.geometry.assembly import Assembly
+from neurosym.geometry.stability.falls import Fall, find_falls
 from neurosym.language.formulas import Formula, Stands
+from neurosym.language.problem import Problem
 from neurosym.language.terms import Fluent, Literal
 from neurosym.pddl.facts import Fact, Mark, Operator
 from neurosym.pddl.instances import Instance, least
-
-if TYPE_CHECKING:
-    from neurosym.geometry.assembly import Assembly
-    from neurosym.geometry.stability.falls import Fall
-    from neurosym.language.problem import Problem
 
 #: Of one way to do an action: into so many operators its disjunctions are multiplied out, at the most. What is left
 #: over gets helper operators instead, which change nothing but a mark.
@@ -34,12 +29,9 @@ Asked = Mapping[str, Stands | None]
 class Weighed:
     """What gravity makes of ground actions.
 
-    Attributes:
-        instances: those that can ever be done, with conditions under which nothing falls after them.
-        helpers: operators that note that one of several facts holds.
-        kept: the marks that helpers set -> those facts; what takes one of them away takes the mark away.
-        sound: whether all falls are known.
-        note: a sentence on how they were found.
+    `instances`: those that can ever be done, with conditions under which nothing falls after them. `helpers`: operators
+    that note that one of several facts holds. `kept`: the marks that helpers set -> those facts; what takes one of them
+    away takes the mark away. `sound`: whether all falls are known. `note`: a sentence on how they were found.
     """
 
     instances: list[Instance]
@@ -91,14 +83,9 @@ def weighed(
 ) -> Weighed:
     """Add to the ways of each removal that no fall can happen after it.
 
-    Args:
-        instances: with their ways, gravity left out.
-        asked: see `standing_asked`; one at least asks.
-        refuted: orders of action primitives in which something falls.
-        seconds: for the search for falls.
+    `instances`: with their ways, gravity left out. `asked`: see `standing_asked`; one at least asks. `refuted`: orders
+    of action primitives in which something falls. `seconds`: for the search for falls.
     """
-    from neurosym.geometry.stability.falls import find_falls  # geometry is no part of the language
-
     world, init = problem.geometry, frozenset(problem.init)
     assert world is not None
     first = next(s for s in asked.values() if s)
@@ -136,8 +123,7 @@ def _avert(
     A fall that could not happen before a removal can happen after it only if what is removed is among the parts
     that must be gone. One that can happen at first must be made impossible by the first removal already.
 
-    Args:
-        removals: names of parts, and what removes them; one part may have several.
+    `removals`: names of parts, and what removes them; one part may have several.
     """
     removers: dict[str, list[Instance]] = {}
     for part, instance in removals:
@@ -156,7 +142,7 @@ def _avert(
         bit = 1 << world.index[part]
         threats = [(k, f) for k, f in enumerate(falls) if not f.moving & bit and (f.gone & bit or not f.gone)]
         ways = []
-        for said, way in instance.ways:
+        for name, way in instance.ways:
             clauses: list[tuple[str, frozenset[Fact]]] = []
             for number, fall in threats:
                 if any(~present(n) in way for n in world.in_mask(fall.moving)):
@@ -168,7 +154,7 @@ def _avert(
                 if number in averted:
                     choices.add(averted[number])
                 clauses.append((f"{number} {instance.name}", frozenset(choices)))
-            ways += [(said, way | conjunction) for conjunction in _multiplied(clauses, kept)]
+            ways += [(name, way | conjunction) for conjunction in _multiplied(clauses, kept)]
         instance.ways = least(ways)
     return kept
 

@@ -4,20 +4,16 @@ A way is a conjunction of facts. Ways follow from what `Derived.formula` says, o
 through all reachable states (`pddl_table`).
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 from neurosym.language.formulas import AnyOf, Formula
+from neurosym.language.problem import Problem
 from neurosym.language.terms import Atom, Derived, Literal
 from neurosym.pddl.facts import Fact, Mark
 from neurosym.pddl.table import ways_from_table
-
-if TYPE_CHECKING:
-    from neurosym.language.problem import Problem
 
 T = TypeVar("T")
 
@@ -27,7 +23,6 @@ class Instance:
     """A ground action.
 
     Attributes:
-        name: the action primitive.
         title: the action and its objects, in words.
         needs: its preconditions that are fluents.
         derived: its other preconditions.
@@ -71,16 +66,16 @@ def ground_instances(problem: Problem) -> list[Instance]:
 
 def formulas_of(problem: Problem, instance: Instance) -> list[Formula] | None:
     """What its derived preconditions say; None where one is silent."""
-    found = []
+    formulas = []
     for literal in instance.derived:
         predicate = literal.atom.predicate
         assert isinstance(predicate, Derived)
-        formula = predicate.formula
-        said = formula(problem.predicate_world, *literal.atom.args) if formula and literal.positive else None
-        if said is None:
+        of = predicate.formula
+        formula = of(problem.predicate_world, *literal.atom.args) if of and literal.positive else None
+        if formula is None:
             return None
-        found.append(said)
-    return found
+        formulas.append(formula)
+    return formulas
 
 
 def with_formulas(
@@ -91,12 +86,9 @@ def with_formulas(
         instance.ways = [("", frozenset(instance.needs))]
         for formula in own or ():
             if isinstance(formula, AnyOf):
-                both = itertools.product(instance.ways, formula.ways)
                 instance.ways = least(
-                    [
-                        (" ".join(filter(None, (said, way.name))), known | frozenset(way.literals))
-                        for (said, known), way in both
-                    ]
+                    (" ".join(filter(None, (name, way.name))), known | frozenset(way.literals))
+                    for (name, known), way in itertools.product(instance.ways, formula.ways)
                 )
     return _settle(problem, instances)
 
@@ -119,11 +111,9 @@ def _settle(problem: Problem, instances: Sequence[Instance]) -> list[Instance]:
         settled = _settled(left, initial)
         for instance in left:
             instance.ways = least(
-                [
-                    (said, frozenset(p for p in way if not (isinstance(p, Literal) and settled.get(p))))
-                    for said, way in instance.ways
-                    if not any(isinstance(p, Literal) and (settled.get(p) is False or ~p in way) for p in way)
-                ]
+                (name, frozenset(p for p in way if not (isinstance(p, Literal) and settled.get(p))))
+                for name, way in instance.ways
+                if not any(isinstance(p, Literal) and (settled.get(p) is False or ~p in way) for p in way)
             )
         left = [i for i in left if i.ways]
     return left

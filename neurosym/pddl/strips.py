@@ -5,33 +5,22 @@ of their own, which effects keep up; disjunctions become one operator a disjunct
 falls that removals can meet (`pddl_gravity`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from dataclasses import replace
 
 from neurosym.errors import InputError
+from neurosym.language.problem import Problem
 from neurosym.language.terms import Derived, Literal
-from neurosym.pddl.facts import Fact as Fact
-from neurosym.pddl.facts import Mark as Mark
-from neurosym.pddl.facts import Operator as Operator
-from neurosym.pddl.facts import Strips as Strips
+from neurosym.pddl.facts import Fact, Mark, Operator, Strips
 from neurosym.pddl.gravity import standing_asked, weighed
 from neurosym.pddl.instances import Instance, formulas_of, ground_instances, with_formulas, with_table
-
-if TYPE_CHECKING:
-    from neurosym.language.problem import Problem
 
 
 def strips(problem: Problem, *, seconds: float | None = None, refuted: Sequence[Sequence[str]] = ()) -> Strips:
     """Compile a problem without rules of its own.
 
-    Args:
-        seconds: for the falls, or for the table of states.
-        refuted: orders of action primitives in which something falls.
-
-    Raises:
-        InputError: a predicate without a formula in a problem of too many states, or a derived goal.
+    `seconds`: for the falls, or for the table of states. `refuted`: orders of action primitives in which something
+    falls. Raises InputError: a predicate without a formula in a problem of too many states, or a derived goal.
     """
     instances = ground_instances(problem)
     formulas = [formulas_of(problem, i) for i in instances]
@@ -42,10 +31,8 @@ def strips(problem: Problem, *, seconds: float | None = None, refuted: Sequence[
     instances = with_formulas(problem, instances, formulas)
     if not any(asked.values()):
         return _compiled(problem, instances)
-    found = weighed(problem, instances, asked, refuted=refuted, seconds=seconds)
-    return _compiled(
-        problem, found.instances, helpers=found.helpers, kept=found.kept, sound=found.sound, notes=(found.note,)
-    )
+    own = weighed(problem, instances, asked, refuted=refuted, seconds=seconds)
+    return _compiled(problem, own.instances, helpers=own.helpers, kept=own.kept, sound=own.sound, notes=(own.note,))
 
 
 def _compiled(
@@ -57,11 +44,7 @@ def _compiled(
     sound: bool = True,
     notes: tuple[str, ...] = (),
 ) -> Strips:
-    """One operator a way of each instance, with what keeps up negative conditions, the order and single use.
-
-    Args:
-        helpers, kept: see `pddl_gravity.Weighed`.
-    """
+    """One operator a way of each instance, with what keeps up negative conditions, the order and single use."""
     names, initial = set(problem.actions), frozenset(problem.init)
     before = [(a, b) for a, b in problem.before if a in names and b in names]
     made = {a for i in instances for a in i.add}
@@ -78,24 +61,17 @@ def _compiled(
         # Each action can be used once. Most see to it themselves: what they take away does not come back.
         spent = any((p.atom in i.delete - made) if p.positive else (p.atom in i.add - unmade) for p in i.needs)
         if not spent:
-            once = Mark("unused", i.name)
-            pre.add(once)
-            delete.add(once)
-            init.add(once)
-        for said, way in i.ways:
-            operators.append(Operator(i.title, i.name, said, way | pre, frozenset(add), frozenset(delete)))
+            for facts in (pre, delete, init):
+                facts.add(Mark("unused", i.name))
+        for how, way in i.ways:
+            operators.append(Operator(i.title, i.name, how, way | pre, frozenset(add), frozenset(delete)))
     operators += helpers
     goal = _goal(problem)
     used = goal.union(*(o.pre for o in operators))
     atoms = {f.atom for f in used if isinstance(f, Literal)}
     init |= {Literal(a) if a in initial else ~a for a in atoms}
-    return Strips(
-        tuple(Operator(o.name, o.action, o.how, o.pre, o.add & used, o.delete & used) for o in operators),
-        frozenset(init & used),
-        goal,
-        sound,
-        notes,
-    )
+    trimmed = tuple(replace(o, add=o.add & used, delete=o.delete & used) for o in operators)
+    return Strips(trimmed, frozenset(init & used), goal, sound, notes)
 
 
 def _goal(problem: Problem) -> frozenset[Fact]:

@@ -1,21 +1,16 @@
 """Conditions read off all reachable states, for predicates that have no formula."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from neurosym.errors import InputError
+from neurosym.language.problem import Problem
 from neurosym.language.search_problem import Rejection
 from neurosym.language.terms import Atom, Derived, Literal
-
-if TYPE_CHECKING:
-    from neurosym.language.problem import Problem
+from neurosym.support.arrays import Truths
 
 #: More states than this are not written down.
 MAX_STATES = 20_000
@@ -23,10 +18,10 @@ MAX_STATES = 20_000
 
 @dataclass(frozen=True)
 class Table:
-    """Attributes:
-    ways: action primitive -> conjunctions: in a reachable state in which its fluents allow it, the action can be
-        done exactly when one of them holds. Actions that can never be done are left out.
-    states: how many were looked at.
+    """Action primitive -> conjunctions (`ways`), and how many `states` were looked at.
+
+    In a reachable state in which its fluents allow it, the action can be done exactly when one of them holds. Actions
+    that can never be done are left out.
     """
 
     ways: Mapping[str, tuple[frozenset[Literal], ...]]
@@ -36,8 +31,7 @@ class Table:
 def ways_from_table(problem: Problem, seconds: float | None = None) -> Table:
     """Look at every reachable state, and at every answer there.
 
-    Raises:
-        InputError: more than `MAX_STATES`, no time left, or a refusal that proves nothing.
+    Raises InputError: more than `MAX_STATES`, no time left, or a refusal that proves nothing.
     """
     end = None if seconds is None else time.monotonic() + seconds
     ground = problem.symbols
@@ -83,14 +77,12 @@ def ways_from_table(problem: Problem, seconds: float | None = None) -> Table:
     ways = {}
     for action, good in yes.items():
         bad = rows[[row[s] for s in sorted(no.get(action, ()))]]
-        found = _cover(rows[[row[s] for s in sorted(good)]], bad)
-        ways[ground.actions[action]] = tuple(
-            frozenset(Literal(atoms[c], positive) for c, positive in way) for way in found
-        )
+        cover = _cover(rows[[row[s] for s in sorted(good)]], bad)
+        ways[ground.actions[action]] = tuple(frozenset(Literal(atoms[c], is_so) for c, is_so in way) for way in cover)
     return Table(ways, len(states))
 
 
-def _cover(good: NDArray[np.bool_], bad: NDArray[np.bool_]) -> list[list[tuple[int, bool]]]:
+def _cover(good: Truths, bad: Truths) -> list[list[tuple[int, bool]]]:
     """Conjunctions of (column, value) that hold in each row of `good`, (n, c), one of them at least; none in `bad`."""
     left, found = good, []
     while len(left):

@@ -6,18 +6,16 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from neurosym.errors import InputError
 from neurosym.geometry.readers.references import referenced
 from neurosym.geometry.step_motion import StepMotion
+from neurosym.language.problem import Problem
 from neurosym.language.search_problem import Rejection
 from neurosym.plan_files.writing import SCHEMA
 from neurosym.planning.result import Status
 from neurosym.registry import load_domain
-
-if TYPE_CHECKING:
-    from neurosym.language.problem import Problem
 
 #: Figures of a search.
 COUNTS = ("iterations", "attempts", "expansions", "seconds")
@@ -27,11 +25,8 @@ COUNTS = ("iterations", "attempts", "expansions", "seconds")
 class SavedPlan:
     """A plan from a file.
 
-    Attributes:
-        problem: made again from what the file says of it.
-        plan: names of the actions, in order.
-        motions: one a step; None where the file says none.
-        document: the whole file.
+    `problem`: made again from what the file says of it. `plan`: names of the actions, in order. `motions`: one a step;
+    None where the file says none. `document`: the whole file.
     """
 
     problem: Problem
@@ -40,11 +35,7 @@ class SavedPlan:
     document: Mapping[str, Any]
 
     def account(self) -> Account:
-        """What the search did.
-
-        Raises:
-            InputError: it is not what `neurosym plan --out` writes.
-        """
+        """What the search did. Raises InputError: it is not what `neurosym plan --out` writes."""
         document = self.document
         try:
             return Account(
@@ -88,8 +79,7 @@ def read_search(path: str | Path) -> SavedPlan:
 def read_plan(path: str | Path) -> SavedPlan:
     """Read a plan.
 
-    Raises:
-        InputError: no such file, not what `neurosym plan --out` writes, of another schema, or without a plan in it.
+    Raises InputError: no such file, not what `neurosym plan --out` writes, of another schema, or without a plan in it.
     """
     document = read_document(Path(path))
     schema = document.get("schema")
@@ -119,8 +109,7 @@ def read_plan(path: str | Path) -> SavedPlan:
 def problem_of(document: Mapping[str, Any], path: str | Path = "plan.json") -> Problem:
     """The problem that a plan's file was made for, made again.
 
-    Raises:
-        InputError: the file does not say which problem it was.
+    Raises InputError: the file does not say which problem it was.
     """
     domain, options = document.get("domain"), document.get("options") or {}
     if not isinstance(domain, str) or not isinstance(options, dict):

@@ -1,15 +1,11 @@
 """What `neurosym plan --out` writes of a problem and of a result."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from neurosym import __version__
-
-if TYPE_CHECKING:
-    from neurosym.language.problem import Problem
-    from neurosym.planning.result import PlanResult
+from neurosym.language.problem import Problem
+from neurosym.planning.result import PlanResult
 
 #: Of the file. Raise it when a reader of the old one would go wrong.
 SCHEMA = 1

@@ -1,7 +1,5 @@
 """What is registered, in words, without loading it: learned priors would make whoever asks wait for their libraries."""
 
-from __future__ import annotations
-
 import ast
 import importlib.util
 import itertools

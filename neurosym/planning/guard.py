@@ -1,7 +1,5 @@
 """What `solve` refuses to be given."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -16,8 +14,7 @@ from neurosym.planning.planner import SIDES, KBestPlanner, Planner, TwoSidedPlan
 def guarded(problem: object, planner: Planner, k: object, budget: object, rng: Any) -> np.random.Generator:
     """Refuse what cannot be planned, before anything is done; gives the generator.
 
-    Raises:
-        InputError: k without a planner that gives several plans, or something else than was expected.
+    Raises InputError: k without a planner that gives several plans, or something else than was expected.
     """
     if k is not None and not (planner.traits.k_best and isinstance(planner, KBestPlanner)):
         raise InputError(f"Expected a planner that gives several plans, best-first or exhaustive; got {planner!r}.")

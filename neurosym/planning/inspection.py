@@ -1,18 +1,14 @@
 """What an assembly is, before any plan: parts, contacts, what is free, what is interlocked and why, if it stands."""
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from neurosym.errors import InputError
 from neurosym.geometry.contact.contacts import TABLE, areas_between
 from neurosym.geometry.queries import AssemblyGeometry
 from neurosym.geometry.step_motion import GROUND
 from neurosym.language.explanation import WhyNot
-
-if TYPE_CHECKING:
-    from neurosym.language.problem import Problem
+from neurosym.language.problem import Problem
 
 
 @dataclass(frozen=True)
@@ -43,8 +39,6 @@ class Inspection:
     """What `inspect` found.
 
     Attributes:
-        parts: one entry a part.
-        contacts: one entry a pair that touches.
         free: names of the parts that can leave at once along a straight line, whatever then falls.
         free_along: the same, each with its directions in words.
         interlocked: names of the parts that never come free along straight lines: not alone, or, if groups were asked
@@ -142,9 +136,8 @@ def _parts(world: AssemblyGeometry) -> tuple[PartFacts, ...]:
         faces = sum(len(body.shape.faces) for body in part.bodies)
         low, high = map(tuple, bounds)
         fixed = part.name in world.assembly.fixed
-        facts.append(
-            PartFacts(part.name, float(mass / part.density), float(mass), (low, high), len(part.bodies), faces, fixed)
-        )
+        sizes = float(mass / part.density), float(mass), (low, high), len(part.bodies), faces
+        facts.append(PartFacts(part.name, *sizes, fixed))
     return tuple(facts)
 
 

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from neurosym.errors import InputError
+from neurosym.support.arrays import Array
 from neurosym.support.deadline import portions
 
 #: Least log-probability a score may have (nats). A prior that is sure still leaves every order a finite cost.
@@ -30,18 +30,16 @@ class OrderScores:
     """A prior's answer: how likely each action is at each step.
 
     Attributes:
-        log_prob: float64, shape (n_steps, n_actions). Rows of exp() sum to one. It is copied, refused if it
-            has NaN or +inf, floored at `LOG_FLOOR` and normalised by rows.
+        log_prob: float64, shape (n_steps, n_actions). Rows of exp() sum to one. It is copied, refused if it has NaN or
+            +inf, floored at `LOG_FLOOR` and normalised by rows.
         actions: names of the actions, one a column; may be empty when there are no names.
-        log_length: float64, shape (n_steps + 1,): log-probability that the task takes 0 .. n_steps steps, or
-            None when it takes n_steps for sure.
-        classes: one integer an action; the cost of an action is that of its class (interchangeable actions
-            share their probability). Default: each action is its own class.
+        log_length: float64, shape (n_steps + 1,): log-probability that it takes 0 .. n_steps steps; None: n_steps.
+        classes: one integer an action; interchangeable actions share their probability. Default: each is its own.
     """
 
-    log_prob: NDArray[np.float64]
+    log_prob: Array
     actions: tuple[str, ...] = ()
-    log_length: NDArray[np.float64] | None = None
+    log_length: Array | None = None
     classes: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
@@ -89,7 +87,7 @@ class OrderScores:
         return int(self.log_prob.shape[1])
 
     @cached_property
-    def costs(self) -> NDArray[np.float64]:
+    def costs(self) -> Array:
         """float64 (n_steps, n_actions): -log of the summed probability of each action's class (nats, >= 0)."""
         ids, column = np.unique(np.asarray(self.classes), return_inverse=True)
         if len(ids) == self.n_actions:
@@ -97,8 +95,7 @@ class OrderScores:
         member = np.zeros((self.n_actions, len(ids)))
         member[np.arange(self.n_actions), column] = 1.0
         summed = np.log(np.exp(self.log_prob) @ member)
-        costs: NDArray[np.float64] = np.maximum(-summed, 0.0)[:, column]
-        return costs
+        return np.asarray(np.maximum(-summed, 0.0)[:, column])
 
     def cost(self, step: int, action: int) -> float:
         """-log P(class of `action` at `step`) in nats; beyond the last step, that of the floor."""
@@ -146,8 +143,7 @@ class OrderScores:
     def restricted(self, actions: Sequence[str]) -> OrderScores:
         """The scores for a task of which some actions are done already: the last steps, the remaining columns.
 
-        Args:
-            actions: the names that are left, each one of `self.actions`.
+        `actions`: the names that are left, each one of `self.actions`.
         """
         if tuple(actions) == self.actions:
             return self
@@ -165,7 +161,7 @@ class OrderScores:
         return OrderScores(rows[:, columns], tuple(actions), length, classes)
 
 
-def _normalised(table: NDArray[np.float64]) -> NDArray[np.float64]:
+def _normalised(table: Array) -> Array:
     """Rows that sum to one in exp(), none below the floor (rows of nothing but -inf become uniform), in their place."""
     for some in portions(np.full(len(table) if table.size else 0, table.shape[1]), _AT_A_TIME):
         rows = table[some]

@@ -1,9 +1,6 @@
 """A prior that needs no training: what lies outermost leaves first."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,12 +8,10 @@ from neurosym.errors import InputError
 from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.blocking.directions import Directions
 from neurosym.geometry.queries import AssemblyGeometry
+from neurosym.language.problem import Problem
 from neurosym.planning.order_scores import OrderScores
 from neurosym.planning.prior import Prior
 from neurosym.support.bitsets import bits
-
-if TYPE_CHECKING:
-    from neurosym.language.problem import Problem
 
 
 class OutermostFirst(Prior):
@@ -26,8 +21,7 @@ class OutermostFirst(Prior):
     comes first, then the farthest from the middle; parts that never come free by themselves are last. Geometry alone,
     along the problem's directions: no pictures, and no question whether anything falls.
 
-    Args:
-        decay: how many steps away from its place in this order a part is e times less likely (steps).
+    `decay`: how many steps away from its place in this order a part is e times less likely (steps).
     """
 
     def __init__(self, *, decay: float = 2.0) -> None:
@@ -38,8 +32,7 @@ class OutermostFirst(Prior):
     def scores(self, problems: Sequence[Problem]) -> list[OrderScores]:
         """One table a problem, (n_actions, n_actions).
 
-        Raises:
-            InputError: the problem's world is no `Assembly`, or its actions are not named after parts.
+        Raises InputError: the problem's world is no `Assembly`, or its actions are not named after parts.
         """
         return [self._scores(problem) for problem in problems]
 

@@ -1,18 +1,16 @@
 """The interface of planners: subclass `Planner`, declare `traits` truthfully, and ask through a `SearchLog`."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from neurosym.language.search_problem import SearchProblem
 from neurosym.planning.budget import Budget
 from neurosym.planning.order_scores import OrderScores
 from neurosym.planning.result import OrderCount, PlanResult
+from neurosym.support.arrays import Array
 
 
 @dataclass(frozen=True)
@@ -105,4 +103,4 @@ class OrderCounter(Protocol):
 
     def count_orders(self, problem: SearchProblem[Any], *, budget: Budget | None = None) -> OrderCount: ...
 
-    def order_marginals(self, problem: SearchProblem[Any]) -> NDArray[np.float64]: ...
+    def order_marginals(self, problem: SearchProblem[Any]) -> Array: ...

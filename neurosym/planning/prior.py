@@ -8,10 +8,11 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from neurosym.errors import InputError
 from neurosym.planning.order_scores import OrderScores
+from neurosym.support.arrays import Pixels
 
 if TYPE_CHECKING:
     from neurosym.language.problem import Problem
@@ -47,7 +48,7 @@ class RandomPrior(Prior):
         return found
 
 
-def as_picture_batch(pictures: ArrayLike) -> tuple[NDArray[np.uint8], bool]:
+def as_picture_batch(pictures: ArrayLike) -> tuple[Pixels, bool]:
     """Pictures as uint8 (M, V, H, W, 3), and whether one set (V, H, W, 3) was given instead of a batch."""
     array = np.asarray(pictures)
     if array.dtype != np.uint8 or array.ndim not in (4, 5) or array.shape[-1] != 3:

@@ -8,10 +8,10 @@ from enum import Enum
 from typing import TYPE_CHECKING, Any
 
 from neurosym.errors import ContractError, InputError
+from neurosym.geometry.step_motion import StepMotion
 from neurosym.language.search_problem import Rejection
 
 if TYPE_CHECKING:
-    from neurosym.geometry.step_motion import StepMotion
     from neurosym.language.explanation import WhyNot
 
 
@@ -31,8 +31,7 @@ class Status(Enum):
 class Plan(tuple[str, ...]):
     """Names of actions in order: a tuple that knows how each of them is done.
 
-    Attributes:
-        motions: one an action (None: it moves nothing in space), or none at all.
+    `motions`: one an action (None: it moves nothing in space), or none at all.
     """
 
     motions: tuple[StepMotion | None, ...]
@@ -103,8 +102,7 @@ class PlanResult:
     def reversed(self) -> Plan:
         """The plan backwards, each motion reversed: how to put together what the plan takes apart.
 
-        Raises:
-            InputError: there is no plan.
+        Raises InputError: there is no plan.
         """
         if self.plan is None:
             raise InputError(f"Expected a result with a plan to reverse; got {self.status.name}.")
@@ -115,11 +113,8 @@ class PlanResult:
 class OrderCount:
     """In how many orders a goal can be reached.
 
-    Attributes:
-        orders: the number; None where the budget ended first.
-        exact: whether there are no others; False where something was refused without proof.
-        states: how many were looked at.
-        seconds: wall-clock time.
+    `orders`: the number; None where the budget ended first. `exact`: whether there are no others; False where something
+    was refused without proof. `states`: how many were looked at. `seconds`: wall-clock time.
     """
 
     orders: int | None

@@ -5,19 +5,16 @@ from __future__ import annotations
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, field, replace
 from time import perf_counter
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
+from neurosym.geometry.step_motion import StepMotion
 from neurosym.language.search_problem import Rejection, SearchProblem, Step
 from neurosym.planning.budget import Budget
 from neurosym.planning.order_scores import OrderScores
 from neurosym.planning.result import Plan, PlanResult, Status
 from neurosym.support.deadline import OutOfTime, within
 
-if TYPE_CHECKING:
-    from neurosym.geometry.step_motion import StepMotion
-
 S = TypeVar("S", bound=Hashable)
-
 #: Rejections kept as evidence in a result. Beyond it only the count goes on: a hard search would fill the memory.
 MAX_BLAME = 10_000
 

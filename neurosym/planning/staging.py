@@ -1,17 +1,12 @@
 """From a plan to a plan in space: which parts each action moves, said by the family, the motions or the effects."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from neurosym.errors import InputError, UnknownNameError
 from neurosym.geometry.staging import Staging, staged
 from neurosym.geometry.step_motion import StepMotion, check_motions
 from neurosym.language.actions import moved_parts
-
-if TYPE_CHECKING:
-    from neurosym.language.problem import Problem
+from neurosym.language.problem import Problem
 
 
 def stage(problem: Problem, plan: Sequence[str], motions: Sequence[StepMotion | None] = ()) -> Staging:
@@ -20,15 +15,9 @@ def stage(problem: Problem, plan: Sequence[str], motions: Sequence[StepMotion | 
     Where a step's motion does not say which parts move, the problem's `Simulation` does; failing that, the effects: an
     action takes away the parts about which it only deletes atoms, else it brings those about which it only adds some.
 
-    Args:
-        problem: what was planned.
-        plan: names of actions, in order.
-        motions: one a step, or none at all, as `PlanResult.motions` has them; for None a free straight line is looked
-            for.
-
-    Raises:
-        InputError: the problem does not say what its actions do to parts, or not one motion a step.
-        UnknownNameError: a name in the plan that is no action.
+    `problem`: what was planned. `plan`: names of actions, in order. `motions`: one a step, or none at all, as
+    `PlanResult.motions` has them; for None a free straight line is looked for. Raises InputError: the problem does not
+    say what its actions do to parts, or not one motion a step; UnknownNameError: a name in the plan that is no action.
     """
     check_motions(motions, len(plan))
     for name in plan:

@@ -1,30 +1,22 @@
 """Independent replay of an order. Shares no code with planners or grounding, and asks geometry anew."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from neurosym.errors import ContractError, InputError, UnknownNameError
 from neurosym.geometry.step_motion import StepMotion, check_motions
+from neurosym.language.problem import Problem
 from neurosym.language.search_problem import Rejection, SearchProblem
 from neurosym.language.semantics import Validation as Validation
 from neurosym.language.state import AtomSet
 from neurosym.language.terms import Derived, Literal
 
-if TYPE_CHECKING:
-    from neurosym.language.problem import Problem
-
 
 def validate(problem: Problem, order: Sequence[str], motions: Sequence[StepMotion | None] = ()) -> Validation:
     """Replay an order, given as names of action primitives (for Soma the pieces' letters).
 
-    Args:
-        motions: one a step, as `PlanResult.motions` has them: then each step must be possible so. Empty: in any way.
-
-    Raises:
-        UnknownNameError: a name that is no action of the problem's domain.
-        InputError: not one motion a step.
+    `motions`: one a step, as `PlanResult.motions` has them: then each step must be possible so. Empty: in any way.
+    Raises UnknownNameError: a name that is no action of the problem's domain; InputError: not one motion a step.
     """
     if not hasattr(problem, "domain"):
         raise InputError(f"Expected a Problem, as Domain.problem makes it; got {problem!r}.")
@@ -106,11 +98,7 @@ def replay(problem: SearchProblem[Any], order: Sequence[str]) -> Validation:
 
 
 def confirm(planner: object, plan: Sequence[str], replayed: Validation) -> None:
-    """Refuse a plan that did not survive its replay.
-
-    Raises:
-        ContractError: it did not.
-    """
+    """Refuse a plan that did not survive its replay. Raises ContractError: it did not."""
     if not replayed.ok:
         raise ContractError(
             f"The planner {type(planner).__name__} answered with the plan {', '.join(plan)}, which fails its replay: "

@@ -5,8 +5,6 @@ A safetensors file starts with the header's length (8 bytes, little-endian) and 
 actions, network and training figures.
 """
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

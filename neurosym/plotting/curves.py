@@ -1,19 +1,15 @@
 """Curves over the number of demonstrations or actions, as the paper's Fig. 5, 6 and 9."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import NullLocator
 
 from neurosym.plotting.style import COLUMN, SMALL, TITLE, add_legend, look_of, tidy
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from neurosym.support.arrays import Numbers
 
 #: Of an axis with many n only so many are named.
 MOST_TICKS = 7
@@ -23,9 +19,7 @@ MOST_TICKS = 7
 class Curves:
     """One panel of curves.
 
-    Attributes:
-        title: what is on the vertical axis, with its unit.
-        values: method -> n -> a value a seed.
+    `title`: what is on the vertical axis, with its unit. `values`: method -> n -> a value a seed.
     """
 
     title: str
@@ -36,13 +30,11 @@ class Curves:
 class Spread:
     """How single sequences come out with growing n, of one method.
 
-    Attributes:
-        method: which.
-        right: n -> int64 (T + 1, T + 1), pictures by the number of steps and of those that are right.
+    `method`: which. `right`: n -> int64 (T + 1, T + 1), pictures by the number of steps and of those that are right.
     """
 
     method: str
-    right: Mapping[int, NDArray[np.int64]]
+    right: Mapping[int, Numbers]
 
 
 def curves_figure(
@@ -50,15 +42,9 @@ def curves_figure(
 ) -> Figure:
     """Panels one above the other: a line is the mean over seeds, its band reaches from the least to the greatest.
 
-    Args:
-        title: of the figure.
-        across: what n counts.
-        panels: what is drawn.
-        spread: adds a panel: the area of a dot is the share of test sequences with that share of steps right.
-        log: whether n is on a logarithmic axis.
+    `title`: of the figure. `across`: what n counts. `panels`: what is drawn. `spread`: adds a panel: the area of a dot
+    is the share of test sequences with that share of steps right. `log`: whether n is on a logarithmic axis.
     """
-    from matplotlib.figure import Figure
-
     total = len(panels) + (spread is not None)
     figure = Figure(figsize=(COLUMN, 0.9 + 1.1 * total), layout="constrained")
     axes = figure.subplots(total, 1, sharex=True, squeeze=False)[:, 0]
@@ -110,8 +96,6 @@ def _bubbles(axis: Axes, spread: Spread) -> None:
 
 
 def _across(axis: Axes, sizes: Sequence[int], across: str, log: bool) -> None:
-    from matplotlib.ticker import NullLocator
-
     if log:
         axis.set_xscale("log")
         axis.xaxis.set_minor_locator(NullLocator())

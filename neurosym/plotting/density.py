@@ -1,18 +1,14 @@
 """How precision is distributed: over seeds, as the paper's Fig. 4 has it, and over single sequences."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import ArrayLike
 
 from neurosym.plotting.style import COLUMN, SMALL, TITLE, add_legend, look_of, mark, narrow, papers_mark, tidy
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from neurosym.support.arrays import Array, Numbers
 
 #: Least width of the Gaussian kernels: a hundred test pictures do not tell shares further apart.
 LEAST_WIDTH = 0.01
@@ -23,7 +19,7 @@ ROW = 0.33
 def density_figure(
     title: str,
     seeds: Mapping[str, Sequence[float]],
-    right: Mapping[str, NDArray[np.int64]],
+    right: Mapping[str, Numbers],
     paper: Mapping[str, float] | None = None,
 ) -> Figure:
     """A row a method. Left: kernel density of the share of whole sequences over seeds, each curve to one height;
@@ -35,8 +31,6 @@ def density_figure(
         right: method -> int64 (T + 1, T + 1), test sequences by the number of steps and of those that are right.
         paper: method -> the paper's mean over seeds, a diamond.
     """
-    from matplotlib.figure import Figure
-
     methods = list(seeds)
     figure = Figure(figsize=(COLUMN, 1.0 + ROW * len(methods)), layout="constrained")
     over_seeds, over_sequences = figure.subplots(1, 2, sharey=True)
@@ -70,7 +64,7 @@ def density_figure(
     return figure
 
 
-def kernel_density(values: ArrayLike, grid: NDArray[np.float64]) -> NDArray[np.float64]:
+def kernel_density(values: ArrayLike, grid: Array) -> Array:
     """Gaussian kernel density on a grid; width by Silverman's rule, at least `LEAST_WIDTH`."""
     own = np.asarray(values, dtype=np.float64)
     width = max(1.06 * float(own.std()) * len(own) ** -0.2, LEAST_WIDTH)
@@ -78,7 +72,7 @@ def kernel_density(values: ArrayLike, grid: NDArray[np.float64]) -> NDArray[np.f
     return np.asarray(kernels.mean(axis=1))
 
 
-def _steps(axis: Axes, level: int, right: NDArray[np.int64], colour: str) -> None:
+def _steps(axis: Axes, level: int, right: Numbers, colour: str) -> None:
     shares = right.sum(axis=0) / right.sum()
     steps = np.arange(len(shares))
     axis.bar(steps, 0.85 * shares, width=0.8, bottom=level, color=colour, zorder=2)

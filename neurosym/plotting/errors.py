@@ -1,21 +1,17 @@
 """What was read wrong: confusion matrices, errors by letter, and by how many letters repeat (the paper's Fig. 8)."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from matplotlib.axes import Axes
+from matplotlib.colors import PowerNorm
+from matplotlib.figure import Figure
 
 from neurosym.plotting.style import COLUMN, SMALL, TITLE, add_legend, look_of, narrow, tidy
+from neurosym.support.arrays import Array, Numbers
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-Counts = Mapping[str, NDArray[np.int64]]
-
+Counts = Mapping[str, Numbers]
 #: How a step that is not there is called.
 NONE = "none"
 #: With more classes than these no share is written into its cell, and letters are smaller.
@@ -31,15 +27,9 @@ def confusion_figure(title: str, labels: Sequence[str], confusion: Counts) -> Fi
 
     Shades grow with the square root of the share, so that rare confusions are seen.
 
-    Args:
-        title: of the figure.
-        labels: names of the K classes.
-        confusion: method -> int64 (K + 1, K + 1), steps by the class demonstrated and the class read. The last are
-            steps that are not there, which are drawn where there are some.
+    `title`: of the figure. `labels`: names of the K classes. `confusion`: method -> int64 (K + 1, K + 1), steps by the
+    class demonstrated and the class read. The last are steps that are not there, which are drawn where there are some.
     """
-    from matplotlib.colors import PowerNorm
-    from matplotlib.figure import Figure
-
     many = len(labels) > WRITTEN
     # The same rows and columns for all methods, or panels could not be compared.
     ends = any(int(own[-1].sum() + own[:, -1].sum()) for own in confusion.values())
@@ -66,8 +56,6 @@ def confusion_figure(title: str, labels: Sequence[str], confusion: Counts) -> Fi
 
 def classes_figure(title: str, labels: Sequence[str], confusion: Counts) -> Figure:
     """The share of each class's demonstrated steps that were read as another; arguments as of `confusion_figure`."""
-    from matplotlib.figure import Figure
-
     figure = Figure(figsize=(COLUMN, 2.3), layout="constrained")
     axis, k = figure.subplots(), len(labels)
     for position, (method, own) in enumerate(confusion.items()):
@@ -90,12 +78,9 @@ def classes_figure(title: str, labels: Sequence[str], confusion: Counts) -> Figu
 def repeats_figure(title: str, repeats: Counts) -> Figure:
     """The share of steps and of sequences read wrong, by how many of a sequence's actions repeat an earlier class.
 
-    Args:
-        title: of the figure.
-        repeats: method -> int64 (T, 4), by the number of repetitions: steps, wrong steps, pictures, wrong pictures.
+    `title`: of the figure. `repeats`: method -> int64 (T, 4), by the number of repetitions: steps, wrong steps,
+    pictures, wrong pictures.
     """
-    from matplotlib.figure import Figure
-
     figure = Figure(figsize=(COLUMN, 3.3), layout="constrained")
     steps, sequences = figure.subplots(2, 1, sharex=True)
     pictures = next(iter(repeats.values()))[:, 2]
@@ -114,7 +99,7 @@ def repeats_figure(title: str, repeats: Counts) -> Figure:
     return figure
 
 
-def write_shares(axis: Axes, shares: NDArray[np.float64], size: float = 6) -> None:
+def write_shares(axis: Axes, shares: Array, size: float = 6) -> None:
     """Each share of a matrix into its cell, in per cent; what rounds to 0% is left out."""
     for i, row in enumerate(shares):
         for j, share in enumerate(row):
@@ -123,7 +108,7 @@ def write_shares(axis: Axes, shares: NDArray[np.float64], size: float = 6) -> No
                 axis.text(j, i, f"{100 * share:.0f}", ha="center", va="center", fontsize=size, color=colour)
 
 
-def _by_row(counts: NDArray[np.int64]) -> NDArray[np.float64]:
+def _by_row(counts: Numbers) -> Array:
     """Shares; a row without counts is NaN, and stays white."""
     totals = counts.sum(axis=1, keepdims=True).astype(float)
     totals[totals == 0] = np.nan

@@ -1,27 +1,25 @@
 """What blocks what along each direction, and what touches what: graphs in layers, or matrices where parts are many."""
 
-from __future__ import annotations
-
+import itertools
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import networkx as nx
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import FancyBboxPatch, Rectangle
 
+from neurosym.geometry.assembly import Assembly
+from neurosym.geometry.blocking.directions import Directions
+from neurosym.geometry.blocking.graph import BlockingGraph
+from neurosym.geometry.contact.contacts import TABLE, areas_between
 from neurosym.geometry.queries import AssemblyGeometry
 from neurosym.geometry.step_motion import GROUND
 from neurosym.plotting.layers import BOX, Layout, box_width, in_inches, in_layers, write_names
 from neurosym.plotting.matrices import blocking_matrices, contact_matrix, depths
 from neurosym.plotting.routes import Point, bends
 from neurosym.plotting.style import COLOURS, COLUMN, SMALL, TITLE
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from neurosym.geometry.assembly import Assembly
-    from neurosym.geometry.blocking.directions import Directions
-    from neurosym.geometry.blocking.graph import BlockingGraph
 
 #: More parts than this are drawn as a matrix.
 MOST_NODES = 16
@@ -45,10 +43,8 @@ def blocking_figure(
     Parts on top are free; those in a frame hit one another, and can leave only together. Arrows that follow from others
     are left out. Of more than `MOST_NODES` parts a matrix is drawn: a row a part, dark where it hits the column's.
 
-    Args:
-        assembly: all parts are there.
-        directions: as `directions_for` takes them; default the axes.
-        title: what it is.
+    `assembly`: all parts are there. `directions`: as `directions_for` takes them; default the axes. `title`: what it
+    is.
     """
     geometry = AssemblyGeometry.of(assembly)
     assembly, graph = geometry.assembly, geometry.blocking(directions)
@@ -83,8 +79,6 @@ def contact_figure(assembly: Assembly | AssemblyGeometry, *, title: str = "assem
     Without a ground the layers count from the fixed parts, or from the first one. Of more than `MOST_NODES` parts a
     matrix is drawn, coloured by area.
     """
-    from neurosym.geometry.contact.contacts import TABLE, areas_between  # loads FCL
-
     geometry = AssemblyGeometry.of(assembly)
     assembly = geometry.assembly
     areas = {
@@ -110,9 +104,6 @@ def contact_figure(assembly: Assembly | AssemblyGeometry, *, title: str = "assem
     write_names(axis, places, [*assembly.fixed, GROUND])
     _write_widths(axis, list(areas.values()))
     return figure
-
-
-# -- graphs ---------------------------------------------------------------------------------------------------
 
 
 def _one_way(graph: BlockingGraph) -> list[int]:
@@ -142,13 +133,8 @@ def _layered(graph: nx.DiGraph) -> tuple[list[tuple[str, ...]], Layout, list[tup
         layers[depth[node]] += sorted(whole.nodes[node]["members"])
     arrows = []
     for a, b in nx.transitive_reduction(whole).edges:
-        pairs = [
-            (x, y)
-            for x in sorted(whole.nodes[a]["members"])
-            for y in sorted(whole.nodes[b]["members"])
-            if graph.has_edge(x, y)
-        ]
-        arrows.append(pairs[0])  # of two groups, one arrow says it
+        pairs = itertools.product(*(sorted(whole.nodes[node]["members"]) for node in (a, b)))
+        arrows.append(next(pair for pair in pairs if graph.has_edge(*pair)))  # of two groups, one arrow says it
     framed = [tuple(sorted(whole.nodes[k]["members"])) for k in whole if len(whole.nodes[k]["members"]) > 1]
     return framed, in_layers(layers, arrows, _WIDTH), arrows
 
@@ -165,9 +151,6 @@ def _from(graph: nx.Graph, roots: Sequence[str]) -> list[list[str]]:
     return [layer for layer in (*layers, rest) if layer]
 
 
-# -- drawing --------------------------------------------------------------------------------------------------
-
-
 def _write_title(axis: Axes, title: str) -> None:
     axis.text(COLUMN / 2, axis.get_ylim()[1] - 0.06, title, fontsize=TITLE, ha="center", va="top", linespacing=1.3)
 
@@ -178,8 +161,6 @@ def _write_note(axis: Axes, note: str) -> None:
 
 def _join(axis: Axes, pair: tuple[str, str], places: Mapping[str, Point], bend: float, look: Mapping[str, Any]) -> None:
     """A line from one box to another, from edge to edge."""
-    from matplotlib.patches import Rectangle
-
     patches = []
     for name in pair:
         (x, y), wide = places[name], box_width(name)
@@ -189,8 +170,6 @@ def _join(axis: Axes, pair: tuple[str, str], places: Mapping[str, Point], bend: 
 
 
 def _frame(axis: Axes, places: Sequence[tuple[float, float]], names: Sequence[str]) -> None:
-    from matplotlib.patches import FancyBboxPatch
-
     left = min(x - box_width(n) / 2 for (x, _), n in zip(places, names)) - 0.04
     right = max(x + box_width(n) / 2 for (x, _), n in zip(places, names)) + 0.04
     low, high = min(y for _, y in places) - BOX, max(y for _, y in places) + BOX

@@ -1,20 +1,14 @@
 """How many iterations planners need with each prior."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import PurePath
-from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
-from neurosym.plotting.labels import shortened
-from neurosym.plotting.style import COLOURS, COLUMN, LOOKS, SMALL, TITLE, add_legend, mark, papers_mark, tidy
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from neurosym.plotting.style import COLOURS, COLUMN, LOOKS, SMALL, TITLE, add_legend, mark, papers_mark, shortened, tidy
 
 #: Counts above this share one bar: the tail of a planner without a prior would squeeze all others.
 LAST_BAR = 12
@@ -33,13 +27,9 @@ def iterations_figure(
     Bars are shares of runs at 0, 1, 2, ... iterations; a dot marks the mean, a diamond the paper's. Made for a
     column of `COLUMN` inches.
 
-    Args:
-        title: what was planned, with n.
-        iterations: planner -> prior -> int64 (runs,); all planners have the same priors. "none" is no prior.
-        paper: (planner, prior) -> the mean that is published.
+    `title`: what was planned, with n. `iterations`: planner -> prior -> int64 (runs,); all planners have the same
+    priors. "none" is no prior. `paper`: (planner, prior) -> the mean that is published.
     """
-    from matplotlib.figure import Figure
-
     runs = {planner: {name: np.asarray(own) for name, own in row.items()} for planner, row in iterations.items()}
     priors = list(next(iter(runs.values())))
     last = min(LAST_BAR, max(1, *(int(own.max()) for row in runs.values() for own in row.values())))

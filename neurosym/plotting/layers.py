@@ -1,20 +1,14 @@
 """Small graphs drawn in rows: where boxes with names go, in inches, so that letters keep their size."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import networkx as nx
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
-from neurosym.plotting.labels import shortened
-from neurosym.plotting.style import COLUMN
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from neurosym.plotting.style import COLUMN, shortened
 
 #: Letters of names (points), and what one of them takes (inches).
 LETTERS, LETTER_WIDTH = 6.5, 0.058
@@ -37,11 +31,8 @@ def in_layers(
 ) -> Layout:
     """Names in layers, the first on top, each layer sorted so that few edges cross.
 
-    Args:
-        layers: names, each once; their order is where the sorting starts.
-        edges: pairs of names that are joined.
-        width: of the drawing (inches); a layer that is wider is staggered.
-        apart: from one layer to the next (inches).
+    `layers`: names, each once; their order is where the sorting starts. `edges`: pairs of names that are joined.
+    `width`: of the drawing (inches); a layer that is wider is staggered. `apart`: from one layer to the next (inches).
     """
     graph = nx.Graph([(a, b) for a, b in edges if a != b])
     graph.add_nodes_from(name for layer in layers for name in layer)
@@ -80,8 +71,6 @@ def box_width(name: str) -> float:
 
 def in_inches(height: float, width: float = COLUMN) -> tuple[Figure, Axes]:
     """A figure with one set of axes, without a frame, whose units are inches from the lower left."""
-    from matplotlib.figure import Figure
-
     figure = Figure(figsize=(width, height))
     axis = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axis.set_xlim(0, width)

@@ -1,15 +1,12 @@
 """Learning curves: loss, and the share of held-out orders right, epoch by epoch."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
+
+from matplotlib.figure import Figure
 
 from neurosym.errors import InputError
 from neurosym.plotting.style import COLUMN, TITLE, add_legend, look_of, mark, tidy
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 class Epoch(Protocol):
@@ -51,8 +48,6 @@ def learning_figure(
     Raises:
         InputError: nothing to draw, or a method without a name of its loss.
     """
-    from matplotlib.figure import Figure
-
     if not any(len(epochs) for epochs in runs.values()):
         raise InputError("Expected at least one epoch to draw; got none.")
     kinds = {method: loss if isinstance(loss, str) else loss.get(method, "") for method in runs}

@@ -1,24 +1,18 @@
 """What blocks and what touches what where parts are many: a row and a column a part."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import networkx as nx
 import numpy as np
-from numpy.typing import NDArray
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
+from neurosym.geometry.assembly import Assembly
+from neurosym.geometry.blocking.graph import BlockingGraph
 from neurosym.geometry.step_motion import GROUND
-from neurosym.plotting.labels import shortened
-from neurosym.plotting.style import COLUMN, SMALL, TITLE, tidy
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from neurosym.geometry.assembly import Assembly
-    from neurosym.geometry.blocking.graph import BlockingGraph
+from neurosym.plotting.style import COLUMN, SMALL, TITLE, shortened, tidy
+from neurosym.support.arrays import Array
+from neurosym.support.bitsets import bits
 
 #: More rows than this bear no names but numbers, and the size of the names (points).
 MOST_NAMES, _LETTERS = 31, 6
@@ -28,10 +22,6 @@ _MOST_LETTERS = 10
 
 def blocking_matrices(title: str, graph: BlockingGraph, shown: Sequence[int]) -> Figure:
     """A matrix a direction: a row a part, dark where it hits the column's; the free ones come first."""
-    from matplotlib.figure import Figure
-
-    from neurosym.support.bitsets import bits
-
     columns = min(2, len(shown))
     rows = -(-len(shown) // columns)
     figure = Figure(figsize=(COLUMN, 0.8 + rows * (COLUMN - 0.5) / columns), layout="constrained")
@@ -59,11 +49,9 @@ def blocking_matrices(title: str, graph: BlockingGraph, shown: Sequence[int]) ->
 
 def contact_matrix(title: str, assembly: Assembly, areas: Mapping[tuple[str, str], float], unit: str) -> Figure:
     """A row and a column a part, and the ground, in the assembly's order; colours are areas of contact."""
-    from matplotlib.figure import Figure
-
     names = [*assembly.names, *([GROUND] if assembly.has_table else [])]
     index = {name: i for i, name in enumerate(names)}
-    table: NDArray[np.float64] = np.full((len(names), len(names)), np.nan)
+    table: Array = np.full((len(names), len(names)), np.nan)
     for (a, b), area in areas.items():
         table[index[a], index[b]] = table[index[b], index[a]] = area
     figure = Figure(figsize=(COLUMN, COLUMN + 0.75), layout="constrained")

@@ -1,18 +1,13 @@
 """Methods one below the other, a panel a figure of merit: each seed, the mean, and what the paper prints."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from neurosym.plotting.style import COLUMN, SMALL, TITLE, add_legend, look_of, mark, papers_mark, tidy
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 #: Height of a row (inches).
 ROW = 0.19
@@ -40,8 +35,6 @@ def points_figure(title: str, rows: Sequence[str], panels: Sequence[Panel], *, e
 
     Made for a column of `COLUMN` inches. `each` says what an open dot is.
     """
-    from matplotlib.figure import Figure
-
     figure = Figure(figsize=(COLUMN, 0.95 + ROW * len(rows)), layout="constrained")
     axes = figure.subplots(1, len(panels), sharey=True, squeeze=False)[0]
     for axis, panel in zip(axes, panels):

@@ -1,17 +1,13 @@
 """Lines between boxes: each as little bent as it can be without running through the boxes of others."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from neurosym.plotting.layers import BOX, box_width
+from neurosym.support.arrays import Array
 
-Array = NDArray[np.float64]
 Point = tuple[float, float]
-
 #: Bends that are tried, as shares of a line's length (the ``rad`` of matplotlib's ``arc3``), the straight line first.
 BENDS = (0.0, 0.12, -0.12, 0.25, -0.25, 0.4, -0.4, 0.6, -0.6, 0.8, -0.8)
 #: What a box in the way, a crossing, leaving the picture, and a whole line's length of bending cost.
@@ -25,13 +21,9 @@ def bends(
 ) -> list[float]:
     """How much each line is bent so that it runs through no box but its own two, and crosses few others.
 
-    Args:
-        pairs: names that are joined, the line going from the first to the second.
-        places: name -> the middle of its box, in inches.
-        room: left, lower, right and upper end of where lines may run (inches).
-
-    Returns:
-        One of `BENDS` a pair.
+    `pairs`: names that are joined, the line going from the first to the second. `places`: name -> the middle of its
+    box, in inches. `room`: left, lower, right and upper end of where lines may run (inches). Returns one of `BENDS` a
+    pair.
     """
     import shapely
 

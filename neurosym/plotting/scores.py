@@ -1,20 +1,17 @@
 """What priors believe: the probability of each action at each step, and the order that was chosen."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import PowerNorm
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
 
 from neurosym.planning.order_scores import OrderScores
 from neurosym.plotting.errors import write_shares
-from neurosym.plotting.labels import shortened, without_common
-from neurosym.plotting.style import COLOURS, COLUMN, SMALL, TITLE, add_legend, mark, tidy
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from neurosym.plotting.style import COLOURS, COLUMN, SMALL, TITLE, add_legend, mark, shortened, tidy, without_common
 
 #: With more actions than these no probability is written into its cell, and then no names beside it.
 WRITTEN, MOST_NAMES = 8, 30
@@ -30,15 +27,9 @@ def scores_figure(
     Frames are the likeliest order, dots the plan that was found. Shades grow with the square root, so that what is
     unlikely is seen. Where the number of steps is unsure, its probability stands at the right of the last step.
 
-    Args:
-        scores: of one prior, or name -> scores, all of the same actions.
-        plan: names of actions in order.
-        title: what the pictures show, or the problem's name.
+    `scores`: of one prior, or name -> scores, all of the same actions. `plan`: names of actions in order. `title`: what
+    the pictures show, or the problem's name.
     """
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import PowerNorm
-    from matplotlib.figure import Figure
-
     given = {"": scores} if isinstance(scores, OrderScores) else dict(scores)
     first = next(iter(given.values()))
     columns = 2 if len(given) > 1 and first.n_actions <= 20 else 1
@@ -73,8 +64,6 @@ def scores_figure(
 
 
 def _mark(axis: Axes, own: OrderScores, plan: Sequence[str]) -> None:
-    from matplotlib.patches import Rectangle
-
     for step, action in enumerate(own.order()):
         square = Rectangle((action - 0.5, step - 0.5), 1, 1, fill=False, ec=COLOURS[3], lw=1.3, clip_on=False, zorder=3)
         axis.add_patch(square)

@@ -4,21 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from neurosym.planning.result import PlanResult
-from neurosym.plotting.labels import shortened, width_of, without_common
-from neurosym.plotting.style import COLOURS, COLUMN, TITLE, add_legend, mark, tidy
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from neurosym.plotting.style import COLOURS, COLUMN, TITLE, add_legend, mark, shortened, tidy, width_of, without_common
 
 #: Refusals that are drawn, the first ones; the title says how many there were.
 MOST_REFUSALS = 300
 #: More rows than this are drawn without names; of many steps so many bear a number.
 MOST_NAMES, MOST_TICKS = 60, 10
-
 #: Size of names (points), and the least number of letters that a cut one has.
 _LETTERS, _LEAST = 6.0, 4
 #: Where branches leave a node, in steps.
@@ -45,12 +42,8 @@ def search_figure(result: PlanResult, *, title: str = "search") -> Figure:
     It is drawn from the refusals that a result keeps. A state that was accepted, and left before anything was refused
     after it, is not among them.
 
-    Args:
-        result: of any planner.
-        title: what was planned, and how.
+    `result`: of any planner. `title`: what was planned, and how.
     """
-    from matplotlib.figure import Figure
-
     root, drawn = _tree(result)
     rows = _lay_out(root, 0)
     steps = max(node.step + (1 if node.refused else 0) for node in _all(root))

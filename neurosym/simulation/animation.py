@@ -1,11 +1,8 @@
 """A plan as moving pictures, drawn by PyBullet's renderer, without a window. `film_files` writes them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from neurosym.geometry.staging import Staging
 from neurosym.simulation.captions import captioned
@@ -14,11 +11,10 @@ from neurosym.simulation.filming import FilmSet
 from neurosym.simulation.looks import Camera
 from neurosym.simulation.scene import part_colours
 from neurosym.simulation.storyboard import best_camera, company, describe, first_part, room_for
+from neurosym.support.arrays import Pixels
 
-Picture = NDArray[np.uint8]
 #: Called with (done, total) pictures.
 Progress = Callable[[int, int], None]
-
 #: Seconds that a step's motion takes, and that the result is held before the next, in a film of few steps.
 STEP_SECONDS, HOLD_SECONDS = 1.0, 0.2
 #: Steps go faster where all of them would take longer than so many seconds, but none takes less than so many.
@@ -36,21 +32,14 @@ def frames(
     size: tuple[int, int] = (640, 480),
     camera: Camera | None = None,
     progress: Progress | None = None,
-) -> Iterator[Picture]:
-    """Pictures of a plan, one after another, `RATE` a second.
+) -> Iterator[Pixels]:
+    """Pictures of a plan, one after another, `RATE` a second: uint8 (height and a line of words, width, 3).
 
     What leaves moves along its path and then is gone; what arrives comes in along it. What made way goes back. Parts
     that are held are set off by a thick line. A group that left together is taken apart by itself.
 
-    Args:
-        staging: the plan in space.
-        title: stands below the first and the last picture.
-        size: width and height in pixels, without the words below.
-        camera: from which side; None takes `best_camera`.
-        progress: called with (done, total).
-
-    Yields:
-        uint8 (height and a line of words, width, 3).
+    `title`: stands below the first and the last picture. `size`: width and height in pixels, without the words below.
+    `camera`: from which side; None takes `best_camera`. `progress`: called with (done, total).
     """
     colours, count = part_colours(staging), len(staging.motions)
     moving, held, ends = pace(count)
@@ -104,7 +93,7 @@ def pace(count: int) -> tuple[int, int, int]:
     return moving, max(1, held), ends
 
 
-def _whole(film: FilmSet, staging: Staging, step: int) -> Picture:
+def _whole(film: FilmSet, staging: Staging, step: int) -> Pixels:
     """What is there before a step; where nothing is, all that ever is, pale."""
     there = staging.there(step)
     if there:

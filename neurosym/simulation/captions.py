@@ -1,34 +1,26 @@
 """Words under pictures."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from neurosym.simulation.scene import RGB
-
-Picture = NDArray[np.uint8]
+from neurosym.support.arrays import Pixels
 
 _PAPER, _TEXT, _FAINT = (255, 255, 255), (38, 38, 46), (214, 214, 220)
 
 
 def captioned(
-    picture: Picture, text: str, *, note: str = "", colour: RGB | None = None, progress: float | None = None
-) -> Picture:
-    """The picture with a line of words below it.
+    picture: Pixels, text: str, *, note: str = "", colour: RGB | None = None, progress: float | None = None
+) -> Pixels:
+    """The picture with a line of words below it: uint8 (taller, width, 3), of an even height, as video wants it.
 
     Args:
-        picture: uint8 (height, width, 3).
         text: on the left; what does not fit is cut, with an ellipsis.
         note: on the right, fainter.
         colour: of a small square before the text, RGB in 0..1; None leaves it out.
         progress: 0..1, the length of a bar between picture and words; None leaves it out.
-
-    Returns:
-        uint8 (taller, width, 3); heights are even, as video wants them.
     """
     from PIL import Image, ImageDraw
 
@@ -61,7 +53,7 @@ def captioned(
     return np.asarray(canvas)
 
 
-def label(picture: Picture, seen: Mapping[str, tuple[float, float, float]]) -> Picture:
+def label(picture: Pixels, seen: Mapping[str, tuple[float, float, float]]) -> Pixels:
     """The picture with names written on circles (x, y, radius), in pixels.
 
     A name too long for its circle stands beside it, away from the middle of all, at the end of a thin line; where it

@@ -6,8 +6,6 @@ passed on. A `Client` is one connection (``DIRECT``, no window and no server) th
 when it is left, when an exception passes, when it is forgotten and when Python ends.
 """
 
-from __future__ import annotations
-
 import contextlib
 import importlib
 import os
@@ -17,7 +15,8 @@ import threading
 import weakref
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
-from types import ModuleType
+from functools import partial
+from types import BuiltinFunctionType, ModuleType
 from typing import IO, Any, Self, cast
 
 from neurosym.errors import MissingDependencyError, NeurosymError
@@ -76,8 +75,7 @@ def _flush() -> None:
 def pybullet() -> Any:
     """The `pybullet` module, imported on first use and without its banner.
 
-    Raises:
-        MissingDependencyError: PyBullet is not installed.
+    Raises MissingDependencyError: PyBullet is not installed.
     """
     global _module
     with _lock:
@@ -106,25 +104,37 @@ class Closeable(ABC):
         self.close()
 
 
+class _Bound:
+    """The `pybullet` module, whose functions are told once and for all which connection they are for."""
+
+    def __init__(self, module: ModuleType, number: int) -> None:
+        self._module, self._number = module, number
+
+    def __getattr__(self, name: str) -> Any:
+        value = getattr(self._module, name)
+        if isinstance(value, BuiltinFunctionType):
+            value = partial(value, physicsClientId=self._number)
+        setattr(self, name, value)
+        return value
+
+
 class Client(Closeable):
     """One connection to a simulator of its own, without a window (`neurosym.simulation.window` has one).
 
-    Use it as a context manager, or call `close`. Attribute `p` is the `pybullet` module and `id` what its
-    functions want as ``physicsClientId``.
-
-    Raises:
-        NeurosymError: PyBullet has no connection left (it allows about a thousand at a time).
+    Use it as a context manager, or call `close`. Attribute `p` is the `pybullet` module, its functions bound to this
+    connection, whose number is `id`. Raises NeurosymError: PyBullet has none left (it allows about a thousand).
     """
 
     def __init__(self) -> None:
-        self.p = pybullet()
+        module = pybullet()
         with _lock, _without_banner():
-            self.id: int = self.p.connect(self.p.DIRECT)
+            self.id: int = module.connect(module.DIRECT)
         if self.id < 0:
             raise NeurosymError(
                 "Expected a connection to PyBullet; it has none left. Close worlds and studios after use ('with')."
             )
-        self._finalizer = weakref.finalize(self, _disconnect, self.p, self.id)
+        self.p: Any = _Bound(module, self.id)
+        self._finalizer = weakref.finalize(self, _disconnect, module, self.id)
 
     @property
     def is_open(self) -> bool:

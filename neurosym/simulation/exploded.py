@@ -1,26 +1,18 @@
 """An exploded view: the parts pulled apart so that each can be seen, along their ways out where a plan has them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from neurosym.errors import InputError
+from neurosym.geometry.rigid_motions import shifted
 from neurosym.geometry.staging import Staging
 from neurosym.simulation.captions import captioned, label
 from neurosym.simulation.filming import FilmSet
 from neurosym.simulation.looks import Camera
 from neurosym.simulation.scene import part_colours
 from neurosym.simulation.storyboard import best_camera
-
-if TYPE_CHECKING:
-    pass
-
-Array = NDArray[np.float64]
-Picture = NDArray[np.uint8]
+from neurosym.support.arrays import Array, Pixels
 
 #: Gap between the bounds of exploded parts, as a share of the median part's extent.
 GAP = 0.35
@@ -31,21 +23,11 @@ MOST_NAMES = 60
 
 
 def explode(staging: Staging, *, spread: float = 1.0) -> dict[str, Array]:
-    """Where the parts are in an exploded view.
+    """Where the parts are in an exploded view: part name -> float64 (3,), by how much it is shifted.
 
     With motions, backwards: the part that leaves last stays, and each other one goes along its way out until its
     bounds are clear of all that are placed by then. Parts without a straight way out, and all parts of a staging
-    without motions, go away from the middle.
-
-    Args:
-        staging: the plan in space; without motions the assembly alone.
-        spread: how far apart: 1 as described, 0 not at all.
-
-    Returns:
-        part name -> float64 (3,), by how much it is shifted.
-
-    Raises:
-        InputError: a spread below 0.
+    without motions, go away from the middle. `spread`: how far apart: 1 as described, 0 not at all.
     """
     if not np.isfinite(spread) or spread < 0:
         raise InputError(f"Expected a spread of 0 or more; got {spread!r}.")
@@ -82,25 +64,18 @@ def exploded_view(
     camera: Camera | None = None,
     title: str = "",
     names: bool = True,
-) -> Picture:
-    """A picture of the parts pulled apart: see `explode`.
+) -> Pixels:
+    """A picture of the parts pulled apart (see `explode`): uint8 (height and a line of words, width, 3).
 
     Args:
         size: width and height in pixels, without the words below.
         camera: from which side; None takes `best_camera`.
-        title: stands below.
         names: whether each part's name is written on it (up to `MOST_NAMES` parts, and unless they bear pictures).
-
-    Returns:
-        uint8 (height and a line of words, width, 3).
     """
     shifts = explode(staging, spread=spread)
     bounds = dict(zip(staging.assembly.names, staging.assembly.part_bounds))
     corners = [np.array(np.meshgrid(*bounds[name].T)).reshape(3, -1).T + shift for name, shift in shifts.items()]
-    where = {}
-    for name, shift in shifts.items():
-        where[name] = np.eye(4)
-        where[name][:3, 3] = shift
+    where = {name: shifted(shift) for name, shift in shifts.items()}
     with FilmSet(
         staging.assembly,
         part_colours(staging),
@@ -112,8 +87,7 @@ def exploded_view(
     ) as film:
         picture = film.picture(staging.assembly.names, where)
         if names and not staging.tops and len(shifts) <= MOST_NAMES:
-            seen = film.seen_at(staging.assembly.names, where)
-            picture = label(picture, seen)
+            picture = label(picture, film.seen_at(staging.assembly.names, where))
     count = len(shifts)
     return captioned(picture, title or "exploded view", note=f"{count} part{'s' if count != 1 else ''}")
 
@@ -131,10 +105,7 @@ def _directions(staging: Staging) -> dict[str, Array]:
 
 
 def _clear(box: Array, placed: Sequence[Array], way: Array, gap: float) -> float:
-    """How far a box (2, 3) must go along a unit vector until it is `gap` away from all others.
-
-    Moved by t, two boxes overlap along an axis for t in an interval, in all while t is in all three: past its end.
-    """
+    """How far a box (2, 3) must go along a unit vector until it is `gap` away from all others."""
     far = 0.0
     for other in placed:
         enter, leave = -np.inf, np.inf

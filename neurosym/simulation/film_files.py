@@ -1,7 +1,5 @@
 """Films as files: GIF, MP4, or a folder of frames, written whole or not at all."""
 
-from __future__ import annotations
-
 import importlib
 import os
 import secrets
@@ -11,12 +9,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from neurosym.errors import InputError, MissingDependencyError
+from neurosym.support.arrays import Pixels
 from neurosym.support.files import replacing
-
-Picture = NDArray[np.uint8]
 
 #: Pictures a second, in every kind of film.
 RATE = 15
@@ -24,7 +20,7 @@ RATE = 15
 ENDINGS = (".gif", ".mp4")
 
 
-def write_film(pictures: Iterator[Picture], out: str | Path) -> Path:
+def write_film(pictures: Iterator[Pixels], out: str | Path) -> Path:
     """Write pictures as a film, whole or not at all.
 
     Args:
@@ -38,11 +34,7 @@ def write_film(pictures: Iterator[Picture], out: str | Path) -> Path:
         MissingDependencyError: .mp4 without the extra `video`.
     """
     path = Path(out)
-    if path.suffix.lower() == ".gif":
-        return _write_gif(pictures, path)
-    if path.suffix.lower() == ".mp4":
-        return _write_mp4(pictures, path)
-    return _write_folder(pictures, path)
+    return {".gif": _write_gif, ".mp4": _write_mp4}.get(path.suffix.lower(), _write_folder)(pictures, path)
 
 
 def check_film(out: str | Path) -> None:
@@ -56,12 +48,12 @@ def check_film(out: str | Path) -> None:
         raise InputError(f"Expected a file to write; {path} is a folder.")
 
 
-def _write_gif(pictures: Iterator[Picture], path: Path) -> Path:
+def _write_gif(pictures: Iterator[Pixels], path: Path) -> Path:
     from PIL import Image
 
     runs: list[Any] = []
     times: list[int] = []
-    last: Picture | None = None
+    last: Pixels | None = None
     for picture in pictures:
         if last is not None and np.array_equal(picture, last):
             times[-1] += 1
@@ -79,7 +71,7 @@ def _write_gif(pictures: Iterator[Picture], path: Path) -> Path:
     return path
 
 
-def _write_mp4(pictures: Iterator[Picture], path: Path) -> Path:
+def _write_mp4(pictures: Iterator[Pixels], path: Path) -> Path:
     ffmpeg = _ffmpeg()
     writer: Any = None
     with replacing(path) as temporary:
@@ -128,7 +120,7 @@ def _is_frame(name: str) -> bool:
     return name.startswith("frame-") and name.endswith(".png")
 
 
-def _write_folder(pictures: Iterator[Picture], path: Path) -> Path:
+def _write_folder(pictures: Iterator[Pixels], path: Path) -> Path:
     from PIL import Image
 
     _check_folder(path)
@@ -146,12 +138,8 @@ def _write_folder(pictures: Iterator[Picture], path: Path) -> Path:
     return path
 
 
-def still(picture: Picture, out: str | Path) -> Path:
-    """Write one picture as PNG, whole or not at all.
-
-    Raises:
-        InputError: a name that does not end in .png.
-    """
+def still(picture: Pixels, out: str | Path) -> Path:
+    """Write one picture as PNG, whole or not at all. Raises InputError: a name that does not end in .png."""
     from PIL import Image
 
     path = Path(out)

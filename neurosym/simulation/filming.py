@@ -1,33 +1,26 @@
 """A camera on a plan: parts at any poses, on a ground that takes their shadows, with dark outlines. No window needed.
 
 PyBullet's software renderer draws at twice the size with a number for each pixel's part; outlines come from where
-those numbers change or the surface folds (see `neurosym.simulation.shading`), and the picture is then made smaller,
+those numbers change or the surface folds (see `neurosym.simulation.drawing`), and the picture is then made smaller,
 which smooths it.
 """
-
-from __future__ import annotations
 
 import tempfile
 from collections.abc import Collection, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from neurosym.errors import InputError
+from neurosym.geometry.assembly import Assembly
 from neurosym.simulation.client import Client, Closeable
-from neurosym.simulation.drawing import drawn, flat_shaded
+from neurosym.simulation.drawing import LIGHT, Single, cast, drawn, flat_shaded, ink, set_off
 from neurosym.simulation.looks import Camera, aimed
 from neurosym.simulation.scene import RGB
-from neurosym.simulation.shading import LIGHT, Single, cast, ink, set_off
 from neurosym.simulation.solids import quaternion
-
-if TYPE_CHECKING:
-    from neurosym.geometry.assembly import Assembly
-
-Array = NDArray[np.float64]
-Picture = NDArray[np.uint8]
+from neurosym.support.arrays import Array, Pixels
 
 #: Drawn so many times larger, along each axis, than it is handed out.
 OVERSAMPLING = 2
@@ -66,7 +59,7 @@ class FilmSet(Closeable):
         size: tuple[int, int] = (640, 480),
         camera: Camera = DEFAULT_CAMERA,
         ground: bool = True,
-        tops: Mapping[str, Picture] | None = None,
+        tops: Mapping[str, Pixels] | None = None,
     ) -> None:
         if min(size) < 16:
             raise InputError(f"Expected pictures of at least 16 x 16 pixels; got {size[0]} x {size[1]}.")
@@ -92,16 +85,12 @@ class FilmSet(Closeable):
 
     def picture(
         self, shown: Collection[str], where: Mapping[str, Array] | None = None, *, marked: Collection[str] = ()
-    ) -> Picture:
+    ) -> Pixels:
         """One picture.
 
-        Args:
-            shown: names of the parts that are to be seen.
-            where: part name -> float64 (4, 4), a motion of the world from where the part rests; others rest.
-            marked: names of parts that are set off by a thick line around them.
-
-        Returns:
-            uint8 (height, width, 3).
+        `shown`: names of the parts that are to be seen. `where`: part name -> float64 (4, 4), a motion of the world
+        from where the part rests; others rest. `marked`: names of parts that are set off by a thick line around them.
+        Returns uint8 (height, width, 3).
         """
         moved = {} if where is None else where
         self._place(shown, moved)
@@ -119,7 +108,7 @@ class FilmSet(Closeable):
                 position = np.full(3, -_AWAY)
             at = position.tolist()
             for body in (number, *([self._tops[name]] if name in self._tops else [])):
-                self._p.resetBasePositionAndOrientation(body, at, turn, physicsClientId=self._client.id)
+                self._p.resetBasePositionAndOrientation(body, at, turn)
 
     def seen_at(
         self, shown: Collection[str], where: Mapping[str, Array] | None = None
@@ -142,7 +131,7 @@ class FilmSet(Closeable):
                 found[name] = (float(x / OVERSAMPLING), float(y / OVERSAMPLING), radius)
         return found
 
-    def _shoot(self, shown: Collection[str], moved: Mapping[str, Array], marked: Collection[str]) -> Picture:
+    def _shoot(self, shown: Collection[str], moved: Mapping[str, Array], marked: Collection[str]) -> Pixels:
         from PIL import Image
 
         colour, distance, owner = self._drawn()
@@ -167,7 +156,7 @@ class FilmSet(Closeable):
         shift = (X[:3, :3] @ self._middle + X[:3, 3] - self._middle) * self._scale
         return np.asarray(self._triangles[name] @ X[:3, :3].T + shift)
 
-    def _drawn(self) -> tuple[Picture, Single, NDArray[np.int32]]:
+    def _drawn(self) -> tuple[Pixels, Single, NDArray[np.int32]]:
         """The large picture: colours (height, width, 3), distances and numbers of parts, -1: none, (height, width)."""
         width, height = (n * OVERSAMPLING for n in self.size)
         colour, depth, parts = drawn(
@@ -189,7 +178,7 @@ class FilmSet(Closeable):
         return colour, distance, owner
 
     def _part(self, assembly: Assembly, number: int, colours: Mapping[str, RGB]) -> int:
-        p, c = self._p, self._client.id
+        p = self._p
         triangles = []
         for i in np.flatnonzero(assembly.owners == number):
             corners = (assembly.bodies.vertices(int(i)) - self._middle) * self._scale
@@ -197,9 +186,9 @@ class FilmSet(Closeable):
         name = assembly.names[number]
         self._triangles[name] = np.concatenate(triangles)
         visual = self._visual(self._triangles[name], [*colours[name], 1.0])
-        return int(p.createMultiBody(0, -1, visual, physicsClientId=c))
+        return int(p.createMultiBody(0, -1, visual))
 
-    def _top(self, name: str, picture: Picture) -> int:
+    def _top(self, name: str, picture: Pixels) -> int:
         """A sheet that lies on a part's bounds, with a picture on it."""
         from PIL import Image
 
@@ -209,16 +198,15 @@ class FilmSet(Closeable):
         sheet = np.array([(x, y, z), (right, y, z), (right, back, z), (x, back, z)])[[0, 1, 2, 0, 2, 3]]
         uv = np.array([(0, 0), (1, 0), (1, 1), (0, 1)])[[0, 1, 2, 0, 2, 3]]
         visual = self._visual(sheet.reshape(-1, 3, 3), [1.0, 1.0, 1.0, 1.0], uvs=uv.tolist())
-        number = int(self._p.createMultiBody(0, -1, visual, physicsClientId=self._client.id))
+        number = int(self._p.createMultiBody(0, -1, visual))
         height, width = picture.shape[:2]
         smooth = Image.fromarray(picture).resize((_FINER * width, _FINER * height), Image.Resampling.LANCZOS)
         with tempfile.TemporaryDirectory(prefix="neurosym-") as folder:
             smooth.save(path := Path(folder) / "top.png")
-            texture = self._p.loadTexture(str(path), physicsClientId=self._client.id)
-        self._p.changeVisualShape(number, -1, textureUniqueId=texture, physicsClientId=self._client.id)
+            texture = self._p.loadTexture(str(path))
+        self._p.changeVisualShape(number, -1, textureUniqueId=texture)
         return number
 
     def _visual(self, triangles: Array, rgba: list[float], **options: Any) -> int:
         options |= flat_shaded(triangles)
-        c = self._client.id
-        return int(self._p.createVisualShape(self._p.GEOM_MESH, rgbaColor=rgba, physicsClientId=c, **options))
+        return int(self._p.createVisualShape(self._p.GEOM_MESH, rgbaColor=rgba, **options))

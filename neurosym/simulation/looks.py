@@ -1,17 +1,13 @@
 """How pictures look: cameras, light, and what chance may vary."""
 
-from __future__ import annotations
-
 import colorsys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from neurosym.errors import UnknownNameError
-
-Array = NDArray[np.float64]
+from neurosym.support.arrays import Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +47,6 @@ class Camera:
 
 #: Free space around what a film shows, as a share of the picture.
 MARGIN = 0.06
-
 #: The four views of the paper: from the top (+y up in the picture), then three sides, from +x, +y and -x, raised a
 #: little. Together they see all but the bottom and the side towards -y.
 VIEWS: tuple[Camera, ...] = (Camera(-90, 90), Camera(0, 15), Camera(90, 15), Camera(180, 15))
@@ -118,11 +113,7 @@ STYLES: Mapping[str, Style] = {
 
 
 def style_named(style: str | Style) -> Style:
-    """A style by its name, or as it is.
-
-    Raises:
-        UnknownNameError: no style of that name.
-    """
+    """A style by its name, or as it is. Raises UnknownNameError: no style of that name."""
     if isinstance(style, Style):
         return style
     if style not in STYLES:
@@ -145,14 +136,7 @@ class Look:
 
 
 def draw_look(style: Style, cameras: Sequence[Camera], colours: Array, rng: np.random.Generator) -> Look:
-    """Draw a look; how many numbers are drawn depends on the counts of cameras and colours only.
-
-    Args:
-        style: what may vary.
-        cameras: the cameras to start from.
-        colours: float64 (n_parts, 3), RGB in 0..1.
-        rng: the only source of chance.
-    """
+    """Draw a look; how many numbers are drawn depends on the counts of cameras and colours, (n_parts, 3), only."""
     azimuth, elevation = np.radians([rng.uniform(*style.light_azimuth), rng.uniform(*style.light_elevation)])
     direction = (np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation))
     turned = tuple(
@@ -178,10 +162,8 @@ def draw_look(style: Style, cameras: Sequence[Camera], colours: Array, rng: np.r
 def aimed(points: Array, camera: Camera, size: tuple[int, int]) -> tuple[Array, Array, tuple[float, float]]:
     """View and projection matrices, float64 (4, 4), and the near and far planes, so that all points show.
 
-    Args:
-        points: float64 (n, 3), in the scene.
-        camera: from which side, and how wide it sees; how far away it stands follows.
-        size: width and height in pixels.
+    `points`: float64 (n, 3), in the scene. `camera`: from which side, and how wide it sees; how far away it stands
+    follows. `size`: width and height in pixels.
     """
     turn = np.array(camera.view_matrix()).reshape(4, 4).T[:3, :3]
     seen = points @ turn.T

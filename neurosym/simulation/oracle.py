@@ -4,26 +4,23 @@ The symbols stay those of the grounded problem; each action takes one part away,
 bears it. What has fallen lies where it fell, so under physics a state is the sequence of removals, not their set.
 """
 
-from __future__ import annotations
-
 from collections import OrderedDict
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal, Protocol
+from typing import Literal, Protocol, Self
 
 import numpy as np
 
 from neurosym.errors import InputError
 from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.step_motion import StepMotion
+from neurosym.language.problem import Problem
 from neurosym.language.search_problem import Rejection, Step
 from neurosym.simulation.client import Closeable
 from neurosym.simulation.physics import MOVED_SHARE, SETTLE_STEPS, Physics, Snapshot
 from neurosym.simulation.world import World
+from neurosym.support.arrays import Array
 from neurosym.support.words import joined
-
-if TYPE_CHECKING:
-    from neurosym.language.problem import Problem
 
 #: The state of a problem under physics: the symbols, and the actions done so far, in order.
 PhysicsState = tuple[int, tuple[int, ...]]
@@ -122,12 +119,8 @@ class PhysicsOracle(Closeable):
         self._world = World(assembly, bodies=kind, physics=physics, present=present)
 
     @classmethod
-    def of(cls, problem: Problem) -> PhysicsOracle:
-        """The oracle of a problem that says how physics would judge it.
-
-        Raises:
-            InputError: it does not.
-        """
+    def of(cls, problem: Problem) -> Self:
+        """The oracle of a problem that says how physics would judge it. Raises InputError: it does not."""
         rule = problem.simulation
         if rule is None:
             raise InputError(
@@ -141,8 +134,6 @@ class PhysicsOracle(Closeable):
         """Close the simulator; closing twice does nothing. An oracle that is forgotten closes itself."""
         self._world.close()
 
-    # -- what planners use ------------------------------------------------------------------------------------
-
     def is_goal(self, state: PhysicsState) -> bool:
         """Whether the symbols of `state` fulfil the goal."""
         return self._base.is_goal(state[0])
@@ -154,18 +145,14 @@ class PhysicsOracle(Closeable):
     def attempt(self, state: PhysicsState, action: int) -> Step[PhysicsState] | Rejection:
         """Simulate taking the part of `action` away, after the removals that `state` remembers.
 
-        The motion of an accepted step says along which direction the part leaves (rule ``"rigid"``).
-
-        Raises:
-            InputError: `state` holds a history that was itself refused, so that nothing can follow it.
+        The motion of an accepted step says along which direction the part leaves (rule ``"rigid"``). Raises InputError:
+        `state` holds a history that was itself refused, so that nothing can follow it.
         """
         symbols, history = state
         answer = self._answer((*history, action))
         if isinstance(answer, Rejection):
             return answer
         return Step((self._base.apply(symbols, action), (*history, action)), answer.motion)
-
-    # -- simulation -------------------------------------------------------------------------------------------
 
     def _answer(self, history: tuple[int, ...]) -> Rejection | _Accepted:
         known = self._answers.get(history)
@@ -229,10 +216,10 @@ class PhysicsOracle(Closeable):
         axes = world.assembly.axes
         blockers: dict[str, None] = {}
         for direction in axes[axes[:, 2] > -1e-9]:
-            found = self._in_the_way(part, direction)
-            if not found:
+            hit = self._in_the_way(part, direction)
+            if not hit:
                 break
-            blockers.update(dict.fromkeys(found))
+            blockers.update(dict.fromkeys(hit))
         else:
             names = tuple(blockers)
             return Rejection(f"{part} cannot leave along a straight line: {joined(names)} in its way.", names)
@@ -240,14 +227,14 @@ class PhysicsOracle(Closeable):
         world.settle()
         moved = world.moved(since=before)
         if moved:
-            said = joined(tuple(f"{name} by {distance:.2g}" for name, distance in moved.items()))
-            return Rejection(f"Parts moved: {said}.", tuple(moved))
+            distances = joined(tuple(f"{name} by {distance:.2g}" for name, distance in moved.items()))
+            return Rejection(f"Parts moved: {distances}.", tuple(moved))
         return _Accepted(StepMotion.along((part,), direction), world.poses())
 
-    def _in_the_way(self, part: str, direction: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> tuple[str, ...]:
+    def _in_the_way(self, part: str, direction: Array) -> tuple[str, ...]:
         """The first parts that `part` runs into when it moves along `direction` until it is past everything."""
         world = self._world
-        others = [name for name in dict.fromkeys(name for name, _ in world.bodies) if name != part]
+        others = [name for name in dict.fromkeys(name for name, _ in world.there) if name != part]
         if not others:
             return ()
         mine, theirs = world.bounds(part), np.array([world.bounds(name) for name in others])

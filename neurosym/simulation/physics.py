@@ -1,7 +1,5 @@
 """Numbers of the simulation: time steps, thresholds, friction; and where bodies lay at one moment."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import inf
@@ -12,7 +10,6 @@ from neurosym.errors import InputError
 BodyKey = tuple[str, int]
 #: Position and quaternion (x, y, z, w) of a body's centre-of-mass frame, in the scene's scale.
 Frame = tuple[tuple[float, ...], tuple[float, ...]]
-
 #: Steps of settling: one second. With a quarter of it 8 verdicts in 100 are wrong, as things fall too slowly.
 SETTLE_STEPS = 240
 #: A part has moved when a corner of it did by more than this share of a typical body. Settling itself shifts
@@ -31,7 +28,6 @@ class Physics:
         friction: coefficient between any two bodies, and the table; None takes the assembly's.
         gravity: in scene units per second squared, downward along z.
         time_step: seconds. 1/60 changes 6 verdicts in 100.
-        solver_iterations: of Bullet's contact solver, each step.
         clearance: share of its width that an upright box gives up at its sides, so that neighbours side by side
             do not touch. With none, Bullet's solver lets them press on one another, and what should fall may jam.
     """

@@ -2,15 +2,18 @@
 
 Four views as in Burke, Subr and Ramamoorthy (2021), section V: the top and three sides (`VIEWS`). Nothing moves and
 nothing collides here: bodies are visual shapes at poses.
+
+Training asks for the same thousands of pictures each time. They are kept on disk, `CHUNK` to a file, under a digest of
+all that decides them: geometry, colours, style, size, seeds, `RENDER_VERSION`.
 """
 
-from __future__ import annotations
-
+import hashlib
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from neurosym.errors import InputError
 from neurosym.geometry.assembly import Assembly
@@ -18,6 +21,8 @@ from neurosym.simulation.client import Client, Closeable
 from neurosym.simulation.drawing import drawn, flat_shaded
 from neurosym.simulation.looks import VIEWS, Camera, Style, draw_look, style_named
 from neurosym.simulation.scene import RGB, Scene, scene_of
+from neurosym.support.arrays import Array, Pixels
+from neurosym.support.disk_cache import cache_folder, fill
 
 #: Called with (done, total) while many pictures are made.
 Progress = Callable[[int, int], None]
@@ -25,8 +30,6 @@ Progress = Callable[[int, int], None]
 Job = tuple[Assembly | Scene, int]
 #: Pictures that one process makes before it hands them back (about a quarter of a second's work).
 CHUNK = 48
-
-
 #: A rectangle before its half edges scale it, facing along z.
 _SQUARE = (np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]), np.array([[0, 1, 2], [0, 2, 3]]))
 
@@ -56,16 +59,14 @@ class PictureStudio(Closeable):
         size: int = 64,
         rng: np.random.Generator | None = None,
         cameras: Sequence[Camera] = VIEWS,
-    ) -> NDArray[np.uint8]:
+    ) -> Pixels:
         """Pictures of an assembly, one a camera.
 
         Args:
             assembly: the parts, or the scene made of them (then `colours` is not asked).
-            style: ``"clean"``, ``"varied"`` or a `Style`.
+            style: ``"clean"``, ``"varied"`` or a `Style`; one that varies needs an `rng`.
             colours: part name -> RGB in 0..1; the default is `PALETTE` by the order of the parts.
             size: height and width in pixels.
-            rng: what varies a style; a style that varies needs one.
-            cameras: where from.
 
         Returns:
             uint8 (n_cameras, size, size, 3).
@@ -101,28 +102,28 @@ class PictureStudio(Closeable):
             pictures = np.clip(np.rint(pictures + noise), 0, 255).astype(np.uint8)
         return pictures
 
-    def _arrange(self, scene: Scene, colours: NDArray[np.float64]) -> None:
+    def _arrange(self, scene: Scene, colours: Array) -> None:
         """Put bodies where the scene has them. The order in which bodies are made shows in single pixels along edges,
         so bodies are reused only by a scene of the very same shapes."""
-        p, c = self._p, self._client.id
+        p = self._p
         if scene.shapes != self._shapes:
-            p.resetSimulation(physicsClientId=c)
+            p.resetSimulation()
             made: dict[tuple[object, ...], int] = {}
             for i, shape in enumerate(scene.shapes):
                 if shape not in made:
                     made[shape] = self._visual(scene, i)
-            self._ids = [p.createMultiBody(0, -1, made[shape], [0, 0, 0], physicsClientId=c) for shape in scene.shapes]
+            self._ids = [p.createMultiBody(0, -1, made[shape], [0, 0, 0]) for shape in scene.shapes]
             self._shapes = scene.shapes
         rows = zip(self._ids, scene.position.tolist(), scene.turn.tolist(), colours[scene.owner].tolist())
         for number, position, turn, rgb in rows:
-            p.resetBasePositionAndOrientation(number, position, turn, physicsClientId=c)
-            p.changeVisualShape(number, -1, rgbaColor=[*rgb, 1.0], physicsClientId=c)
+            p.resetBasePositionAndOrientation(number, position, turn)
+            p.changeVisualShape(number, -1, rgbaColor=[*rgb, 1.0])
 
     def _visual(self, scene: Scene, i: int) -> int:
-        p, c = self._p, self._client.id
+        p = self._p
         vertices, faces = scene.meshes.get(i, _SQUARE)
         surface = flat_shaded((vertices * scene.half[i])[faces])
-        return int(p.createVisualShape(p.GEOM_MESH, **surface, physicsClientId=c))
+        return int(p.createVisualShape(p.GEOM_MESH, **surface))
 
 
 def render_views(
@@ -133,7 +134,7 @@ def render_views(
     size: int = 64,
     rng: np.random.Generator | None = None,
     cameras: Sequence[Camera] = VIEWS,
-) -> NDArray[np.uint8]:
+) -> Pixels:
     """Pictures of one assembly, uint8 (4, size, size, 3); see `PictureStudio.views`, faster for many."""
     with PictureStudio() as studio:
         return studio.views(assembly, style=style, colours=colours, size=size, rng=rng, cameras=cameras)
@@ -148,20 +149,12 @@ def render_many(
     workers: int = 1,
     progress: Progress | None = None,
     cameras: Sequence[Camera] = VIEWS,
-) -> NDArray[np.uint8]:
+) -> Pixels:
     """Pictures of many assemblies, in order, the same for any number of workers.
 
-    Args:
-        jobs: pairs of an assembly (or a scene, whose colours are its own) and its seed.
-        style: as in `PictureStudio.views`.
-        colours: part name -> RGB in 0..1, for all.
-        size: height and width in pixels.
-        workers: processes; 1 stays in this one.
-        progress: called with (done, total).
-        cameras: where from.
-
-    Returns:
-        uint8 (len(jobs), n_cameras, size, size, 3).
+    `jobs`: pairs of an assembly (or a scene, whose colours are its own) and its seed. `style, colours, size, cameras`:
+    as in `PictureStudio.views`, for all. `workers`: processes; 1 stays in this one. `progress`: called with (done,
+    total). Returns uint8 (len(jobs), n_cameras, size, size, 3).
     """
     scenes = scenes_of(jobs, colours)
     pictures = np.empty((len(jobs), len(cameras), size, size, 3), dtype=np.uint8)
@@ -177,9 +170,7 @@ def render_many(
 
 def scenes_of(jobs: Sequence[Job], colours: Mapping[str, RGB] | None) -> list[tuple[Scene, int]]:
     """The scenes of jobs, with their seeds."""
-    return [
-        (given if isinstance(given, Scene) else scene_of(given, colours), int(seed)) for given, seed in jobs
-    ]
+    return [(given if isinstance(given, Scene) else scene_of(given, colours), int(seed)) for given, seed in jobs]
 
 
 def render_chunks(
@@ -190,35 +181,63 @@ def render_chunks(
     cameras: Sequence[Camera] = VIEWS,
 ) -> Any:
     """An iterator over the pictures of each chunk, uint8 (n, n_cameras, size, size, 3), in order."""
+    draw = partial(_render_chunk, style=style, size=size, cameras=cameras)
     if workers == 1 or len(chunks) < 2:
-        return _in_this_process(chunks, style, size, cameras)
+        return map(draw, chunks)
     from joblib import Parallel, delayed
 
-    pool = Parallel(n_jobs=workers, return_as="generator")
-    return pool(delayed(_render_chunk)(chunk, style, size, cameras) for chunk in chunks)
+    return Parallel(n_jobs=workers, return_as="generator")(delayed(draw)(chunk) for chunk in chunks)
 
 
-def _in_this_process(
-    chunks: Sequence[Sequence[tuple[Scene, int]]], style: Style, size: int, cameras: Sequence[Camera]
-) -> Any:
+def _render_chunk(chunk: Sequence[tuple[Scene, int]], **options: Any) -> Pixels:
     with PictureStudio() as studio:
-        for chunk in chunks:
-            yield _draw(studio, chunk, style, size, cameras)
+        return np.stack([studio.views(scene, rng=np.random.default_rng(seed), **options) for scene, seed in chunk])
 
 
-def _render_chunk(
-    chunk: Sequence[tuple[Scene, int]], style: Style, size: int, cameras: Sequence[Camera]
-) -> NDArray[np.uint8]:
-    with PictureStudio() as studio:
-        return _draw(studio, chunk, style, size, cameras)
+#: Raise it whenever the same request would give other pixels.
+RENDER_VERSION = 1
 
 
-def _draw(
-    studio: PictureStudio, chunk: Sequence[tuple[Scene, int]], style: Style, size: int, cameras: Sequence[Camera]
-) -> NDArray[np.uint8]:
-    return np.stack(
-        [
-            studio.views(scene, style=style, size=size, rng=np.random.default_rng(seed), cameras=cameras)
-            for scene, seed in chunk
-        ]
+def cached_pictures(
+    jobs: Sequence[Job],
+    *,
+    style: str | Style = "clean",
+    colours: Mapping[str, RGB] | None = None,
+    size: int = 64,
+    workers: int = 1,
+    progress: Progress | None = None,
+    folder: str | Path | None = None,
+    cameras: Sequence[Camera] = VIEWS,
+) -> Pixels:
+    """Pictures of many assemblies, as `render_many` makes them, from disk where they were made before.
+
+    Put together what is asked for together: a file holds 48 jobs that follow one another (a cube in its 48
+    orientations, say), and is found again only if they do.
+
+    `folder`: where the files are; None means `cache_folder`. The others, and what is returned, as there.
+    """
+    look = style_named(style)
+    if size < 1:
+        raise InputError(f"Expected pictures of at least one pixel; got size={size}.")
+    where = (cache_folder() if folder is None else Path(folder)) / "pictures"
+    scenes = scenes_of(jobs, colours)
+    chunks = [scenes[i : i + CHUNK] for i in range(0, len(scenes), CHUNK)]
+    pictures = np.empty((len(scenes), len(cameras), size, size, 3), dtype=np.uint8)
+    # Level 1: clean pictures shrink 30 times, noisy ones hardly at any level.
+    fill(
+        [pictures[i : i + CHUNK] for i in range(0, len(scenes), CHUNK)],
+        [where / f"{_key(chunk, look, size, cameras)}.z" for chunk in chunks],
+        lambda missing: render_chunks([chunks[i] for i in missing], look, size, workers, cameras),
+        level=1,
+        progress=progress,
     )
+    return pictures
+
+
+def _key(chunk: Sequence[tuple[Scene, int]], style: Style, size: int, cameras: Sequence[Camera]) -> str:
+    # A style that does not vary draws the same for every seed.
+    seeds = [seed if style.is_random else 0 for _, seed in chunk]
+    digest = hashlib.sha256(repr((RENDER_VERSION, style, tuple(cameras), size, seeds)).encode())
+    for scene, _ in chunk:
+        digest.update(scene.digest)
+    return digest.hexdigest()

@@ -13,25 +13,22 @@ mesh with a curved hollow is taken apart by V-HACD, approximately (see `neurosym
 part collides exactly as it is.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from contextlib import ExitStack
-from typing import TYPE_CHECKING
+
+import numpy as np
 
 from neurosym.geometry.staging import Staging
 from neurosym.geometry.step_motion import StepMotion
+from neurosym.language.problem import Problem
 from neurosym.planning.staging import stage
 from neurosym.simulation.carrying import Carrier, hold
 from neurosym.simulation.oracle import COLLAPSE_CUBES, CUBES_CLEARANCE
 from neurosym.simulation.physics import MOVED_SHARE, SETTLE_STEPS, Physics, Snapshot
 from neurosym.simulation.replay_report import ReplayReport, StepReplay, in_hand, reason_of
+from neurosym.simulation.solids import BodiesKind
+from neurosym.simulation.window import WorldWindow
 from neurosym.simulation.world import World
-from neurosym.simulation.world_window import WorldWindow
-
-if TYPE_CHECKING:
-    from neurosym.geometry.assembly import Assembly
-    from neurosym.language.problem import Problem
 
 #: A pulled part that ends farther than this from its path's end, in typical bodies, was jammed.
 JAMMED_SHARE = 0.5
@@ -52,8 +49,6 @@ def replay_plan(
     """Replay a plan in PyBullet.
 
     Args:
-        problem: what was planned.
-        plan: names of actions, in order.
         motions: one a step, as `PlanResult.motions` has them, or none; then a free straight line is looked for.
         pulled: whether parts are pulled along their path by a grip, against friction, instead of by hand.
         bodies: ``"rigid"``: every part is one body; ``"cubes"``: every body of a part is independent, a part is
@@ -100,21 +95,12 @@ def replay_staging(
 ) -> ReplayReport:
     """The same for a plan that is given in space.
 
-    Args:
-        physics: friction, gravity and the solver's numbers; None takes the assembly's friction.
-
-    The others are those of `replay_plan`.
+    `physics`: friction, gravity and the solver's numbers; None takes the assembly's friction.
     """
     with ExitStack() as stack:
-        world = stack.enter_context(
-            World(
-                staging.assembly,
-                bodies="cubes" if bodies == "cubes" else "parts",
-                physics=physics,
-                present=staging.present,
-                meshes="decompose",
-            )
-        )
+        kind: BodiesKind = "cubes" if bodies == "cubes" else "parts"
+        made = World(staging.assembly, bodies=kind, physics=physics, present=staging.present, meshes="decompose")
+        world = stack.enter_context(made)
         shown = stack.enter_context(WorldWindow(world, staging)) if window else None
         run = _Run(world, staging, bodies == "cubes", pulled, threshold, shown)
         start = run.start()
@@ -150,7 +136,8 @@ class _Run:
     ) -> None:
         self.world, self.cubes, self.pulled, self.window = world, cubes, pulled and not cubes, window
         self.threshold = MOVED_SHARE * world.unit if threshold is None else threshold
-        self.smallest = smallest_part(staging.assembly)
+        #: The smallest extent of any part along the world's axes, in the assembly's length unit.
+        self.smallest = float(np.ptp(staging.assembly.part_bounds, axis=1).min())
         self._staging = staging
 
     def start(self) -> StepReplay:
@@ -162,7 +149,7 @@ class _Run:
     def step(self, number: int) -> StepReplay:
         """Do one step, and let the rest settle."""
         world, action, motion = self.world, self._staging.plan[number], self._staging.motions[number]
-        there = {part for part, _ in world.bodies}
+        there = {part for part, _ in world.there}
         if motion.arrives:
             later = self._staging.motions[number + 1 :]
             if any(other.arrives and set(motion.parts) & set(other.parts) for other in later):
@@ -226,8 +213,3 @@ class _Run:
             reason += " One cube alone may fall, by this rule."
         judged = (distance, share, farthest, moved, blocked, stood, reason)
         return StepReplay(action, motion.parts, motion.arrives, *judged, motion.held)
-
-
-def smallest_part(assembly: Assembly) -> float:
-    """The smallest extent of any part along the world's axes, in the assembly's length unit."""
-    return float((assembly.part_bounds[:, 1] - assembly.part_bounds[:, 0]).min())

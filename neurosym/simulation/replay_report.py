@@ -1,7 +1,5 @@
 """What a replay found, step by step, and in words."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -15,9 +13,7 @@ class StepReplay:
     """What one step did to the parts that stay.
 
     Attributes:
-        action: name of the action.
-        parts: names of the parts that went, or came.
-        arrives: whether they came.
+        parts, arrives: names of the parts that went, or came; whether they came.
         held: names of the parts that were held meanwhile.
         in_hand: whether it was done in the hand, where nothing else can fall: a group that left, or will arrive, as a
             whole is taken apart, or put together, there.
@@ -27,7 +23,6 @@ class StepReplay:
         moved: the parts that moved by more than the threshold, with how far.
         in_the_way: names of the parts that the path cuts into; of the moving parts themselves, where they were jammed.
         stood_still: whether nothing was in the way and the rest stood still.
-        reason: one sentence.
     """
 
     action: str
@@ -54,9 +49,7 @@ class ReplayReport:
         threshold: the displacement above which a part has moved, in the assembly's length unit.
         smallest: the smallest extent of any part, same unit.
         bodies: ``"rigid"`` or ``"cubes"``, see `replay_plan`.
-        pulled: whether parts were pulled along.
         unit: of all lengths here, as the assembly says it; None: it does not.
-        gravity: whether there was any.
         friction: coefficient between any two bodies, and the table.
     """
 
@@ -102,13 +95,7 @@ class ReplayReport:
 
 
 def _step_json(step: StepReplay) -> dict[str, Any]:
-    return {
-        **vars(step),
-        "parts": list(step.parts),
-        "moved": dict(step.moved),
-        "in_the_way": list(step.in_the_way),
-        "held": list(step.held),
-    }
+    return {name: list(value) if isinstance(value, tuple) else value for name, value in vars(step).items()}
 
 
 def reason_of(
@@ -119,23 +106,23 @@ def reason_of(
     share: float,
     farthest: str | None,
 ) -> str:
-    said = []
+    sentences = []
     if blocked and set(blocked) == set(motion.parts):
-        said.append(f"{joined(blocked)} jammed on the way.")
+        sentences.append(f"{joined(blocked)} jammed on the way.")
     elif blocked:
-        said.append(f"{joined(blocked)} {'is' if len(blocked) == 1 else 'are'} in the way of {joined(motion.parts)}.")
+        sentences.append(
+            f"{joined(blocked)} {'is' if len(blocked) == 1 else 'are'} in the way of {joined(motion.parts)}."
+        )
     if moved:
-        said.append("Moved: " + joined([f"{part} by {far:.3g}" for part, far in moved.items()]) + ".")
+        sentences.append("Moved: " + joined([f"{part} by {far:.3g}" for part, far in moved.items()]) + ".")
     elif farthest is None:
-        said.append("Nothing is left.")
-    elif not said:
-        said.append(f"The rest stood still; {farthest} moved by {distance:.2g}, {share:.2%} of the smallest part.")
-    return " ".join(said)
+        sentences.append("Nothing is left.")
+    elif not sentences:
+        sentences.append(f"The rest stood still; {farthest} moved by {distance:.2g}, {share:.2%} of the smallest part.")
+    return " ".join(sentences)
 
 
 def in_hand(action: str, motion: StepMotion, what: str) -> StepReplay:
     """A step that is done where nothing else can fall."""
-    said = f"{joined(motion.parts)} {what}"
-    return StepReplay(
-        action, motion.parts, motion.arrives, 0.0, 0.0, None, {}, (), True, said, motion.held, in_hand=True
-    )
+    where, words = (motion.parts, motion.arrives), f"{joined(motion.parts)} {what}"
+    return StepReplay(action, *where, 0.0, 0.0, None, {}, (), True, words, motion.held, in_hand=True)

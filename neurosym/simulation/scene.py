@@ -1,7 +1,5 @@
 """What a picture shows: an assembly as plain arrays, in the cameras' frame, with a colour for each part."""
 
-from __future__ import annotations
-
 import colorsys
 import hashlib
 from collections.abc import Mapping, Sequence
@@ -9,17 +7,14 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from neurosym.errors import InputError, UnknownNameError
 from neurosym.geometry.assembly import Assembly
-from neurosym.geometry.shapes import Shape
 from neurosym.geometry.staging import Staging
+from neurosym.support.arrays import Array, Numbers
 
-Array = NDArray[np.float64]
 RGB = tuple[float, float, float]
-
 #: Colours of parts in their order, RGB in 0..1: Okabe and Ito's, which people with any colour vision tell apart, black
 #: left out as it hides in the shade. Later parts take them again, lighter, then darker.
 PALETTE: tuple[RGB, ...] = (
@@ -31,7 +26,6 @@ PALETTE: tuple[RGB, ...] = (
     (0.84, 0.37, 0.00),
     (0.80, 0.47, 0.65),
 )
-
 
 #: Colour of parts that never move, RGB in 0..1, in films, windows and the page.
 FIXED: RGB = (0.55, 0.55, 0.53)
@@ -56,8 +50,8 @@ class Scene:
     position: Array
     turn: Array
     half: Array
-    meshes: Mapping[int, tuple[Array, NDArray[np.int64]]]
-    owner: NDArray[np.int64]
+    meshes: Mapping[int, tuple[Array, Numbers]]
+    owner: Numbers
     colours: Array
 
     @cached_property
@@ -80,9 +74,7 @@ class Scene:
         return found.digest()
 
 
-def scene_of(
-    assembly: Assembly, colours: Mapping[str, RGB] | None = None, *, frame: Array | None = None
-) -> Scene:
+def scene_of(assembly: Assembly, colours: Mapping[str, RGB] | None = None, *, frame: Array | None = None) -> Scene:
     """An assembly as the cameras see it.
 
     Args:
@@ -107,19 +99,13 @@ def scene_of(
     is_box = assembly.bodies.is_box
     others = np.flatnonzero(~is_box)
     frames, half, owner = _faces(assembly, poses, np.flatnonzero(is_box), scale)
-    meshes = {
-        len(frames) + i: (_shape(assembly, n).vertices, _shape(assembly, n).faces)
-        for i, n in enumerate(others.tolist())
-    }
+    shapes = [assembly.bodies[n].shape for n in others.tolist()]
+    meshes = {len(frames) + i: (shape.vertices, shape.faces) for i, shape in enumerate(shapes)}
     frames = np.concatenate([frames, poses[others]])
     half = np.concatenate([half, np.full((len(others), 3), scale)])
     owner = np.concatenate([owner, assembly.owners[others]])
     turn = Rotation.from_matrix(frames[:, :3, :3]).as_quat()
     return Scene(frames[:, :3, 3], turn, half, meshes, owner, np.array(chosen))
-
-
-def _shape(assembly: Assembly, body: int) -> Shape:
-    return assembly.bodies[body].shape
 
 
 #: The six faces of a box: rotations that take z to the face's outward normal, and the axes that then lie along x and y.
@@ -136,9 +122,7 @@ _TURNS = np.array(
 )
 
 
-def _faces(
-    assembly: Assembly, poses: Array, boxes: NDArray[np.int64], scale: float
-) -> tuple[Array, Array, NDArray[np.int64]]:
+def _faces(assembly: Assembly, poses: Array, boxes: Numbers, scale: float) -> tuple[Array, Array, Numbers]:
     """Frames (n, 4, 4), half edges (n, 3) and owners (n,) of the boxes' faces, without those that cover each other."""
     half = assembly.bodies.box_sizes[boxes] * scale / 2
     R = poses[boxes, :3, :3]
@@ -150,18 +134,12 @@ def _faces(
     frames, half = frames.reshape(-1, 4, 4), (reach * [1.0, 1.0, 0.0]).reshape(-1, 3)
     seen = np.ones(len(frames), dtype=bool)
     # Only equal cubes on one lattice of directions: there, two faces with one middle cover each other exactly.
-    alike = len(boxes) and np.ptp(reach) < 1e-9 and np.allclose(_lattice(R[0].T @ R), 0, atol=1e-9)
-    if alike:
-        _, which, count = np.unique(
-            np.round(frames[:, :3, 3], 6) + 0.0, axis=0, return_inverse=True, return_counts=True
-        )
+    cosines = np.abs(R[0].T @ R) if len(boxes) else R
+    if len(boxes) and np.ptp(reach) < 1e-9 and np.allclose(cosines, np.round(cosines), rtol=0, atol=1e-9):
+        middles = np.round(frames[:, :3, 3], 6) + 0.0
+        _, which, count = np.unique(middles, axis=0, return_inverse=True, return_counts=True)
         seen = count[which.ravel()] == 1
     return frames[seen], half[seen], owner[seen]
-
-
-def _lattice(R: Array) -> Array:
-    """How far rotations (n, 3, 3) are from taking axes to axes."""
-    return np.asarray(np.abs(R) - np.round(np.abs(R)))
 
 
 def palette_colour(i: int) -> RGB:
@@ -186,8 +164,8 @@ def part_colour(i: int, of: int) -> RGB:
 def part_colours(staging: Staging) -> dict[str, RGB]:
     """A colour for each part of a plan: its own; grey where it is fixed; or by its place in the assembly."""
     names, fixed = staging.assembly.names, staging.assembly.fixed
-    found = {name: FIXED if name in fixed else part_colour(i, len(names)) for i, name in enumerate(names)}
-    return found | dict(staging.colours)
+    own = {name: FIXED if name in fixed else part_colour(i, len(names)) for i, name in enumerate(names)}
+    return own | dict(staging.colours)
 
 
 def _checked(name: str, colour: Sequence[float]) -> RGB:

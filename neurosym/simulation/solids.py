@@ -5,25 +5,22 @@ one unit more than small ones. So a `RigidBody` carries its own mass properties,
 along the principal axes, and the whole scene is scaled until a typical body measures one unit.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from neurosym.errors import InputError
 from neurosym.geometry.assembly import Assembly
+from neurosym.geometry.rigid_motions import posed
 from neurosym.geometry.shapes import Body, Box, Part
+from neurosym.support.arrays import Array, Numbers
 
-Array = NDArray[np.float64]
 BodiesKind = Literal["parts", "cubes"]
 #: What to do with meshes that are not convex: refuse them, or take them apart into convex pieces.
 MeshesKind = Literal["refuse", "decompose"]
-
 #: A mesh that fills its convex hull to this share is taken as the hull: CAD facets are rarely exactly convex.
 CONVEX_FILL = 1 - 1e-3
 #: The same where meshes may be decomposed: facets of a curved face would give hundreds of pieces, for nothing.
@@ -51,7 +48,7 @@ class Solid:
     volume: float
     centre: Array
     inertia: Array
-    faces: NDArray[np.int64] | None = None
+    faces: Numbers | None = None
 
     @property
     def corners(self) -> Array:
@@ -63,13 +60,9 @@ class Solid:
 class RigidBody:
     """What moves as one: a part, or a single piece of it.
 
-    Attributes:
-        part: name of the part it belongs to.
-        index: which piece of the part, 0 where a part is one body.
-        solids: its convex pieces.
-        mass: mass (unit of the scene: the densest part has density one).
-        X_WC: float64 (4, 4), frame at the centre of mass along the principal axes.
-        inertia: float64 (3,), principal moments in that frame.
+    `index`: which piece of the part, 0 where a part is one body. `solids`: its convex pieces. `mass`: in units of the
+    scene: the densest part has density one. `X_WC`: float64 (4, 4), frame at the centre of mass along the principal
+    axes. `inertia`: float64 (3,), principal moments in that frame.
     """
 
     part: str
@@ -95,16 +88,11 @@ def typical_extent(assembly: Assembly) -> float:
 
 
 def rigid_bodies(
-    assembly: Assembly,
-    kind: BodiesKind,
-    scale: float,
-    clearance: float = 0.0,
-    meshes: MeshesKind = "refuse",
+    assembly: Assembly, kind: BodiesKind, scale: float, clearance: float = 0.0, meshes: MeshesKind = "refuse"
 ) -> tuple[RigidBody, ...]:
     """The bodies that a simulation of `assembly` moves, lengths multiplied by `scale`.
 
     Args:
-        assembly: parts in the world.
         kind: ``"parts"``: each part is one rigid compound; ``"cubes"``: each piece of it is a body of its own.
         scale: scene lengths per length unit of the assembly.
         clearance: share of its width that an upright box gives up at its sides (not at its top and bottom).
@@ -129,9 +117,7 @@ def rigid_bodies(
     return tuple(made)
 
 
-def _solids(
-    part: Part, body: Body, scale: float, clearance: float, meshes: MeshesKind, static: bool
-) -> list[Solid]:
+def _solids(part: Part, body: Body, scale: float, clearance: float, meshes: MeshesKind, static: bool) -> list[Solid]:
     X_WB = np.array(part.X_WP @ body.X_PB, dtype=np.float64)
     X_WB[:3, 3] *= scale
     R, corners = X_WB[:3, :3], body.shape.vertices * scale
@@ -149,7 +135,7 @@ def _solids(
 
 
 def _mesh_solids(
-    name: str, X_WB: Array, corners: Array, faces: NDArray[np.int64], meshes: MeshesKind, static: bool
+    name: str, X_WB: Array, corners: Array, faces: Numbers, meshes: MeshesKind, static: bool
 ) -> list[Solid]:
     import trimesh
 
@@ -190,9 +176,7 @@ def _join(name: str, index: int, solids: Sequence[Solid], density: float) -> Rig
     else:
         moments, R = np.linalg.eigh(inertia)
         R = R * np.sign(np.linalg.det(R))
-    X_WC = np.eye(4)
-    X_WC[:3, :3], X_WC[:3, 3] = R, centre
-    return RigidBody(name, index, tuple(solids), density * volume, X_WC, density * moments)
+    return RigidBody(name, index, tuple(solids), density * volume, posed(R, centre), density * moments)
 
 
 def quaternion(R: Array) -> Array:
@@ -202,7 +186,4 @@ def quaternion(R: Array) -> Array:
 
 def matrix(position: Sequence[float] | Array, quaternion_xyzw: Sequence[float] | Array) -> Array:
     """Position and quaternion (x, y, z, w) to a pose, float64 (4, 4)."""
-    X = np.eye(4)
-    X[:3, :3] = Rotation.from_quat(quaternion_xyzw).as_matrix()
-    X[:3, 3] = position
-    return X
+    return posed(Rotation.from_quat(quaternion_xyzw).as_matrix(), position)

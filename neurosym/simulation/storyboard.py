@@ -1,15 +1,11 @@
 """What a film of a plan shows at each step: who is in the picture, from which side, how large, and in which words."""
 
-from __future__ import annotations
-
 import numpy as np
-from numpy.typing import NDArray
 
 from neurosym.geometry.staging import Staging
 from neurosym.simulation.filming import DEFAULT_CAMERA, TOPS_CAMERA
 from neurosym.simulation.looks import Camera
-
-Array = NDArray[np.float64]
+from neurosym.support.arrays import Array
 
 #: So many degrees the camera turns towards the broad side of an assembly that is four times as long as wide.
 _TURN = 20.0
@@ -56,11 +52,11 @@ def describe(staging: Staging, step: int) -> str:
     verb = "place" if motion.arrives else "remove"
     others = [name for name in motion.parts if name != part]
     name = part if action in motion.parts else f"{action}: {part}"
-    said = f"{verb} {name}{' with ' + _few(others) if others else ''}"
+    words = f"{verb} {name}{' with ' + _few(others) if others else ''}"
     if not motion.arrives and not around >= set(staging.there(step)):
-        said = f"take {name} off {_few(sorted(around - {part}))}"
+        words = f"take {name} off {_few(sorted(around - {part}))}"
     held = f", {_few(motion.held)} held" if motion.held else ""
-    return f"{said}, {motion.course}{held}"
+    return f"{words}, {motion.course}{held}"
 
 
 def _few(names: tuple[str, ...] | list[str]) -> str:
@@ -81,11 +77,9 @@ def best_camera(staging: Staging) -> Camera:
 
 def room_for(staging: Staging) -> Array:
     """float64 (n, 3), in the world: bounds of all parts, resting and at places along their paths."""
-    assembly, found = staging.assembly, []
-    corners = {}
-    for name, bounds in zip(assembly.names, assembly.part_bounds):
-        corners[name] = np.array(np.meshgrid(*bounds.T)).reshape(3, -1).T
-        found.append(corners[name])
+    bounds = zip(staging.assembly.names, staging.assembly.part_bounds)
+    corners = {name: np.array(np.meshgrid(*b.T)).reshape(3, -1).T for name, b in bounds}
+    found = list(corners.values())
     for motion in staging.motions:
         for share in np.linspace(0, 1, 2 * len(motion.tracks[0].poses) + 1):
             found += [corners[name] @ X[:3, :3].T + X[:3, 3] for name, X in motion.at(float(share)).items()]

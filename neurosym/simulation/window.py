@@ -4,8 +4,6 @@ So a slow screen leaves out pictures, not time, and what comes out is the same w
 the whole process when its window is closed, or when there is no OpenGL: its window has a process of its own.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import select
@@ -19,14 +17,18 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from scipy.spatial import ConvexHull
 
 from neurosym.errors import NeurosymError
+from neurosym.geometry.staging import Staging
 from neurosym.simulation.client import Closeable
+from neurosym.simulation.drawing import LIGHT
 from neurosym.simulation.looks import Camera, aimed
-from neurosym.simulation.shading import LIGHT
-
-Array = NDArray[np.float64]
+from neurosym.simulation.scene import part_colours
+from neurosym.simulation.solids import RigidBody, Solid
+from neurosym.simulation.storyboard import best_camera, room_for
+from neurosym.simulation.world import World
+from neurosym.support.arrays import Array, Numbers
 
 #: Pictures a second, at most.
 RATE = 30
@@ -44,10 +46,8 @@ _FIELD_OF_VIEW, _SIZE = 90.0, (1024, 768)
 class Shown:
     """What one body looks like.
 
-    Attributes:
-        colour: RGB in 0..1.
-        triangles: float64 (n, 3, 3), in the body's frame; or
-        mesh: a file, with its pose in the body's frame: name, position (3,), quaternion (x, y, z, w).
+    `colour`: RGB in 0..1. `triangles`: float64 (n, 3, 3), in the body's frame; or `mesh`: a file, with its pose in the
+    body's frame: name, position (3,), quaternion (x, y, z, w).
     """
 
     colour: tuple[float, float, float]
@@ -58,14 +58,9 @@ class Shown:
 class Window(Closeable):
     """A window, until it is closed from either side (a context manager).
 
-    Args:
-        bodies: what there is to see.
-        room: float64 (n, 3), points that are to be in view.
-        camera: from which side; how far away it stands follows from `room`.
-        ground: height of the table; None: there is none.
-
-    Raises:
-        NeurosymError: there is no screen, or no OpenGL.
+    `bodies`: what there is to see. `room`: float64 (n, 3), points that are to be in view. `camera`: from which side;
+    how far away it stands follows from `room`. `ground`: height of the table; None: there is none. Raises
+    NeurosymError: there is no screen, or no OpenGL.
     """
 
     def __init__(self, bodies: Sequence[Shown], room: Array, camera: Camera, ground: float | None) -> None:
@@ -104,10 +99,8 @@ class Window(Closeable):
     def advance(self, seconds: float, poses: Callable[[], Array]) -> None:
         """Let simulated time pass, and show where things are, if it is time for a picture. At once when it was closed.
 
-        Args:
-            seconds: of simulated time.
-            poses: called when a picture is due; float64 (n_bodies, 7), positions and quaternions (x, y, z, w);
-                `HIDDEN` for a body that is not there.
+        `seconds`: of simulated time. `poses`: called when a picture is due; float64 (n_bodies, 7), positions and
+        quaternions (x, y, z, w); `HIDDEN` for a body that is not there.
         """
         if not self.is_open:
             return
@@ -190,3 +183,44 @@ def _started() -> subprocess.Popen[bytes]:
         # An interrupt from the keyboard is for the simulation, which then closes the window.
         start_new_session=True,
     )
+
+
+class WorldWindow(Spectator):
+    """Shows a world as its time passes (a context manager).
+
+    `world`: what is simulated. `staging`: the plan that is done there, for colours and for the room that its paths
+    want. Raises NeurosymError: there is no screen, or no OpenGL.
+    """
+
+    def __init__(self, world: World, staging: Staging) -> None:
+        self._world, self._keys = world, tuple(world.made)
+        colours = part_colours(staging)
+        bodies = [Shown(colours[key[0]], triangles=_triangles(body)) for key, body in world.made.items()]
+        ground = staging.assembly.ground * world.scale if staging.assembly.has_table else None
+        self._window = Window(bodies, room_for(staging) * world.scale, best_camera(staging), ground)
+
+    def tick(self) -> None:
+        """One time step of the world has passed."""
+        self._window.advance(self._world.physics.time_step, self._poses)
+
+    def _poses(self) -> Array:
+        frames = self._world.poses().frames
+        return np.array([(*frames[key][0], *frames[key][1]) if key in frames else HIDDEN for key in self._keys])
+
+
+def _triangles(body: RigidBody) -> Array:
+    """float64 (n, 3, 3): the surface of a body in its own frame."""
+    corners = [(_faces(solid), (solid.corners - body.X_WC[:3, 3]) @ body.X_WC[:3, :3]) for solid in body.solids]
+    return np.concatenate([points[faces] for faces, points in corners])
+
+
+def _faces(solid: Solid) -> Numbers:
+    """int64 (n, 3), outward: of the mesh as it is, or of the hull of its corners."""
+    if solid.faces is not None:
+        return solid.faces
+    hull, points = ConvexHull(solid.corners), solid.corners
+    faces = np.array(hull.simplices, dtype=np.int64)
+    a, b, c = (points[faces[:, i]] for i in range(3))
+    inward = np.einsum("ni,ni->n", np.cross(b - a, c - a), hull.equations[:, :3]) < 0
+    faces[inward] = faces[inward][:, ::-1]
+    return faces

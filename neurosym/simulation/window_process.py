@@ -4,8 +4,6 @@ It reads one line of JSON, the scene, and then poses, seven numbers a body; it a
 Whatever PyBullet prints goes nowhere. It ends when there is nothing more to read, or when its window is closed.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import sys

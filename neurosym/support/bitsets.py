@@ -1,17 +1,16 @@
 """Sets of small numbers as Python integers, a bit a number."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np
-from numpy.typing import NDArray
+
+from neurosym.support.arrays import Numbers
 
 #: Up to so many bodies a table of all pairs is filled at once (16 MB).
 _DENSE = 4_000
 
 
-def bitsets(pairs: NDArray[np.int64], count: int) -> list[int]:
+def bitsets(pairs: Numbers, count: int) -> list[int]:
     """For pairs (i, j), int64 (k, 2), of numbers below `count`: per i, a bitset of its j."""
     if count <= _DENSE:
         table = np.zeros((count, count), dtype=bool)

@@ -4,8 +4,6 @@ Importing them loads no numba. It looks for changes only in the file of the func
 that call one another belong into one file.
 """
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
@@ -13,7 +11,6 @@ from typing import Any, TypeVar, cast
 from neurosym.support.progress import tell
 
 F = TypeVar("F", bound=Callable[..., Any])
-
 #: Functions of one file, by the file's names; whether each is kept on disk by itself.
 _waiting: dict[int, list[tuple[Callable[..., Any], bool]]] = {}
 _ready: dict[Callable[..., Any], Callable[..., Any]] = {}

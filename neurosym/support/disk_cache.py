@@ -4,8 +4,6 @@ Work that was killed goes on where it stopped, what is damaged is made again, an
 costs speed, no more.
 """
 
-from __future__ import annotations
-
 import contextlib
 import os
 import zlib
@@ -57,9 +55,8 @@ def fill(
 ) -> None:
     """Fill arrays from their files, and those that have none from `make`, whose answers are then kept.
 
-    Args:
-        places: arrays whose rows are counted in `progress`.
-        make: given the numbers of the missing ones, gives their contents in that order.
+    `places`: arrays whose rows are counted in `progress`. `make`: given the numbers of the missing ones, gives their
+    contents in that order.
     """
     missing = [i for i, (path, place) in enumerate(zip(paths, places, strict=True)) if not load(path, place)]
     total = sum(map(len, places))

@@ -1,7 +1,5 @@
 """Files that are written whole or not at all: what reads them, or a kill, never meets half a file."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import secrets

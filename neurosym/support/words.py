@@ -1,7 +1,5 @@
 """Lists of names, and directions, in a sentence."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 #: Names, or sentences of one kind, beyond this many are counted, not listed; the data has them all.

@@ -4,8 +4,6 @@ Each is written as layers from the bottom up, side by side: rows go along +y dow
 part and a dot is nothing. Their levels are confirmed in the tests by a search over all subsets of parts.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from neurosym.errors import InputError, UnknownNameError
@@ -17,12 +15,9 @@ Cells = dict[str, list[tuple[int, int, int]]]
 class Burr:
     """A puzzle of unit cells.
 
-    Attributes:
-        name: what it is called here.
-        layers: the cells, as text.
-        levels: the moves of each separation until all parts are single (BurrTools' 4.1); None: it cannot be done.
-        groups: whether no single part can leave by one straight line, but parts together can.
-        note: what it shows, in a sentence.
+    `name`: what it is called here. `layers`: the cells, as text. `levels`: the moves of each separation until all parts
+    are single (BurrTools' 4.1); None: it cannot be done. `groups`: whether no single part can leave by one straight
+    line, but parts together can. `note`: what it shows, in a sentence.
     """
 
     name: str
@@ -40,8 +35,7 @@ class Burr:
 def read_layers(text: str) -> Cells:
     """Cells (x, y, z) of each letter in layers that stand side by side, the lowest first.
 
-    Raises:
-        InputError: rows with different numbers of layers, or no letter at all.
+    Raises InputError: rows with different numbers of layers, or no letter at all.
     """
     found: Cells = {}
     rows = [line.split() for line in text.strip().splitlines()]
@@ -124,11 +118,7 @@ BURRS = {burr.name: burr for burr in (STRAIGHT, PAIRS, LEVEL_4, BOLTS, RINGS)}
 
 
 def burr(name: str) -> Burr:
-    """One of them by its name.
-
-    Raises:
-        UnknownNameError: there is none of that name.
-    """
+    """One of them by its name. Raises UnknownNameError: there is none of that name."""
     if name not in BURRS:
         raise UnknownNameError("burr puzzle", name, BURRS)
     return BURRS[name]

@@ -4,8 +4,6 @@ Tries to catch a family lying: promises that are broken, oracles that change the
 something else than planners do, training problems that turn up in the test.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Sequence
 from typing import Any
@@ -32,12 +30,9 @@ def check_domain(
     """Check a problem family.
 
     Args:
-        domain: its name, or the family.
         problems: which to check in depth; default three of its test part.
-        facts: recompute its known facts.
-        pictures: take pictures and compare them.
-        walks: random walks a problem.
-        seed: of the walks.
+        facts, pictures: whether known facts are recomputed, and pictures taken and compared.
+        walks, seed: random walks a problem.
 
     Raises:
         ContractError: what was expected, and what came.
@@ -68,9 +63,9 @@ def check_problem(problem: Problem, *, walks: int = 4, rng: np.random.Generator 
     _require(len(search.classes) == len(search.actions), f"{label} to have a class an action")
     _require(problem.actions == tuple(search.actions), f"{label} to list the actions that planners see")
     hash(search.initial)
-    lessons: list[tuple[int, Rejection]] = []
+    known: list[tuple[int, Rejection]] = []
     for _ in range(walks):
-        _walk(problem, search, chance, label, lessons)
+        _walk(problem, search, chance, label, known)
 
 
 def _walk(
@@ -78,7 +73,7 @@ def _walk(
     search: SearchProblem[Any],
     rng: np.random.Generator,
     label: str,
-    lessons: list[tuple[int, Rejection]],
+    known: list[tuple[int, Rejection]],
 ) -> None:
     """A random walk: every refusal on it must keep its promise for the rest of it."""
     state = search.initial
@@ -100,7 +95,7 @@ def _walk(
                     f"{[search.actions[u] for u in until]} is done ({refusal.reason}); it was allowed after "
                     f"{[search.actions[b] for b in done]}. Make `until` larger, or None."
                 )
-            for learned, refusal in lessons:
+            for learned, refusal in known:
                 if learned == a and isinstance(answer, Step) and not set(refusal.until) & set(done):
                     raise ContractError(
                         f"Expected {label} to refuse {search.actions[a]} in every state before one of "
@@ -109,7 +104,7 @@ def _walk(
                     )
             if isinstance(answer, Rejection):
                 if answer.unconditional and answer.until:
-                    lessons.append((a, answer))
+                    known.append((a, answer))
                 _require(bool(answer.reason), f"{label} to give a reason for each refusal", search.actions[a])
                 sure = answer.proved or not answer.unconditional
                 _require(sure, f"{label} to promise nothing everywhere that it has not proved", search.actions[a])
@@ -141,8 +136,8 @@ def _walk(
 
 def replay_allows(problem: Problem, names: Sequence[str]) -> bool:
     """Whether the independent replay can do all of these actions (goal or no goal)."""
-    found = validate(problem, names)
-    return found.ok or found.failed_at == len(names)
+    replayed = validate(problem, names)
+    return replayed.ok or replayed.failed_at == len(names)
 
 
 def _check_pictures(problem: Problem) -> None:

@@ -3,12 +3,10 @@
 Claims (`PlannerTraits`) are compared with brute force; counts with those of an oracle that counts for itself.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -37,7 +35,7 @@ class Toy:
     plans: tuple[tuple[int, ...], ...]
 
     @classmethod
-    def of(cls, name: str, problem: SearchProblem[Any]) -> Toy:
+    def of(cls, name: str, problem: SearchProblem[Any]) -> Self:
         return cls(name, problem, tuple(brute_force_plans(problem)))
 
     @property
@@ -47,7 +45,7 @@ class Toy:
 
 def toys(seeds: int = 12) -> list[Toy]:
     """The problems of the suite: solvable and not, with dead ends, with equal actions, with plans of many lengths."""
-    found = [
+    made = [
         Toy.of("number line", NumberLine((1, 1, 2, 3, -1), goal=4)),
         Toy.of("number line without a way", NumberLine((2, 2, 4), goal=5)),
         Toy.of("goal at the start", NumberLine((1, 2), goal=0)),
@@ -58,9 +56,9 @@ def toys(seeds: int = 12) -> list[Toy]:
         Toy.of("tiles without a word", Tiles("aab", ("abba",))),
     ]
     for seed in range(seeds):
-        found.append(Toy.of(f"removal {seed}", Removal.random(seed)))
-        found.append(Toy.of(f"removal {seed}, in part", Removal.random(seed, partial=True, spoiling=0.15)))
-    return found
+        made.append(Toy.of(f"removal {seed}", Removal.random(seed)))
+        made.append(Toy.of(f"removal {seed}, in part", Removal.random(seed, partial=True, spoiling=0.15)))
+    return made
 
 
 def priors(toy: Toy, seed: int) -> Iterator[tuple[str, OrderScores | None]]:
@@ -88,12 +86,8 @@ def priors(toy: Toy, seed: int) -> Iterator[tuple[str, OrderScores | None]]:
 def check_planner(planner: str | Planner, *, seeds: int = 12) -> None:
     """Check that a planner keeps the contract of `neurosym.planning.planner.Planner` and what its traits claim.
 
-    Args:
-        planner: a registered name, or a planner.
-        seeds: random problems; more is slower and more searching.
-
-    Raises:
-        ContractError: what was expected and what came, on which problem and with which scores.
+    `planner`: a registered name, or a planner. `seeds`: random problems; more is slower and more searching. Raises
+    ContractError: what was expected and what came, on which problem and with which scores.
     """
     made = load_planner(planner)
     for toy in toys(seeds):
@@ -177,21 +171,16 @@ def _check_counts(counting: Counting[Any], result: PlanResult, where: str) -> No
     _require(not counting.no_candidates, where, "candidates alone to be attempted", counting.no_candidates[:3])
     _require(result.attempts == counting.attempts, where, f"{counting.attempts} attempts", result.attempts)
     _require(result.expansions == counting.expansions, where, f"{counting.expansions} expansions", result.expansions)
-    _require(
-        result.iterations >= counting.refusals, where, f"{counting.refusals} iterations or more", result.iterations
-    )
+    enough = result.iterations >= counting.refusals
+    _require(enough, where, f"{counting.refusals} iterations or more", result.iterations)
     kept = min(result.iterations, MAX_BLAME)
     _require(len(result.blame) == kept, where, f"{kept} refusals in blame", len(result.blame))
 
 
 def _check_repeats(planner: Planner, toy: Toy, scores: OrderScores | None, result: PlanResult, where: str) -> None:
     again = planner.plan(toy.problem, scores, rng=np.random.default_rng(3))
-    _require(
-        replace(again, seconds=0.0) == replace(result, seconds=0.0),
-        where,
-        "the same result from the same seed",
-        "another",
-    )
+    same = replace(again, seconds=0.0) == replace(result, seconds=0.0)
+    _require(same, where, "the same result from the same seed", "another")
 
 
 def _costs_are_promised(toy: Toy, scores: OrderScores) -> bool:

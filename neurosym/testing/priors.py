@@ -1,19 +1,15 @@
 """The conformance suite for priors: run it on one of your own, with problems of the domain it is for."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 import numpy as np
 
 from neurosym.errors import ContractError
+from neurosym.language.problem import Problem
 from neurosym.planning.order_scores import OrderScores
 from neurosym.planning.prior import Prior
-
-if TYPE_CHECKING:
-    from neurosym.language.problem import Problem
 
 #: Largest difference in log-probability (nats) between one problem asked alone and in a batch: networks compute
 #: batches in another order of additions.
@@ -28,10 +24,8 @@ def check_prior(prior: Prior, problems: Sequence[Problem], *, pictures_only: boo
     alone (not on the batch, the order of the batch, or an earlier call); and that it leaves the problems' pictures
     and numpy's global generator as they were.
 
-    Args:
-        prior: what to check.
-        problems: at least two, different ones; include one with a partial start if your domain has them.
-        pictures_only: also check that the prior reads nothing of a problem but its pictures and names.
+    `prior`: what to check. `problems`: at least two, different ones; include one with a partial start if your domain
+    has them. `pictures_only`: also check that the prior reads nothing of a problem but its pictures and names.
     """
     if len(problems) < 2:
         raise ValueError(f"Expected at least two problems to check a prior with; got {len(problems)}.")
@@ -58,9 +52,8 @@ def check_prior(prior: Prior, problems: Sequence[Problem], *, pictures_only: boo
         try:
             seen = _answers(prior, bare)
         except AttributeError as error:
-            raise ContractError(
-                f"Expected `scores` to read pictures and names only; it also reads more: {error}."
-            ) from None
+            message = f"Expected `scores` to read pictures and names only; it also reads more: {error}."
+            raise ContractError(message) from None
         _check_same("with the same pictures and names, all else taken away", problems, first, seen, BATCH_TOLERANCE)
 
 
@@ -110,16 +103,9 @@ def _check_same(
 
 def _bare(problem: Problem) -> Problem:
     """Only what a picture prior may read."""
-    return cast(
-        "Problem",
-        SimpleNamespace(
-            observation=problem.observation,
-            actions=tuple(problem.actions),
-            classes=tuple(problem.classes),
-            name=problem.name,
-            family=problem.family,
-        ),
-    )
+    kept = {name: getattr(problem, name) for name in ("observation", "name", "family")}
+    bare = SimpleNamespace(actions=tuple(problem.actions), classes=tuple(problem.classes), **kept)
+    return cast("Problem", bare)
 
 
 def _global_generator() -> tuple[Any, ...]:

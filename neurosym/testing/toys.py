@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -76,15 +76,12 @@ class Removal:
     @classmethod
     def random(
         cls, seed: int, n: int = 5, *, blocking: float = 0.25, spoiling: float = 0.06, partial: bool = False
-    ) -> Removal:
+    ) -> Self:
         """A structure drawn from `seed`: sometimes solvable, sometimes not, with dead ends.
 
-        Args:
-            seed: of everything.
-            n: parts.
-            blocking: how likely one part stands in another's way, in each of one or two directions.
-            spoiling: how likely the removal of one part makes another's impossible.
-            partial: ask for two of the parts only, so that plans differ in length.
+        `seed`: of everything. `n`: parts. `blocking`: how likely one part stands in another's way, in each of one or
+        two directions. `spoiling`: how likely the removal of one part makes another's impossible. `partial`: ask for
+        two of the parts only, so that plans differ in length.
         """
         rng = np.random.default_rng(seed)
 
@@ -98,7 +95,7 @@ class Removal:
         return cls(blockers, spoilers, needs, sum(1 << int(p) for p in wanted), promises=bool(rng.random() < 0.7))
 
     @classmethod
-    def loose(cls, n: int) -> Removal:
+    def loose(cls, n: int) -> Self:
         """Nothing stands in the way of anything: every order is a plan."""
         return cls(((0,),) * n, (0,) * n, (0,) * n, (1 << n) - 1)
 
@@ -199,11 +196,8 @@ class Tiles:
 class Table:
     """A problem written out: where each action leads from each state. What is not listed is refused.
 
-    Attributes:
-        actions: their names; each is its own class.
-        leads: (state, action) -> state.
-        goal: the state to reach.
-        names: (state, action) -> the actions that its refusal names as evidence, without a promise.
+    `actions`: their names; each is its own class. `leads`: (state, action) -> state. `goal`: the state to reach.
+    `names`: (state, action) -> the actions that its refusal names as evidence, without a promise.
     """
 
     actions: tuple[str, ...]
@@ -213,7 +207,7 @@ class Table:
     initial: str = "start"
 
     @classmethod
-    def crossing(cls) -> Table:
+    def crossing(cls) -> Self:
         """Two ways lead to one state, and only one of them leaves the action that is needed there."""
         return cls(("a", "b"), {("start", "a"): "middle", ("start", "b"): "middle", ("middle", "a"): "end"}, "end")
 

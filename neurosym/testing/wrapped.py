@@ -1,7 +1,5 @@
 """The same search problem, asked otherwise: relabelled, counted, with nothing proved. For testing planners."""
 
-from __future__ import annotations
-
 from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Generic, TypeVar

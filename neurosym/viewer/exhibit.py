@@ -1,13 +1,8 @@
 """What the page asks for and what it shows: no server, no browser."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import Any, Self
 
 from neurosym.errors import NeurosymError
 from neurosym.geometry.step_motion import StepMotion
@@ -19,11 +14,11 @@ from neurosym.planning.order_scores import OrderScores
 from neurosym.planning.result import PlanResult, Status
 from neurosym.planning.staging import stage
 from neurosym.planning.validation import validate
+from neurosym.support.arrays import Pixels
 from neurosym.viewer.timeline import Timeline
 
 #: Makes a problem of options given by name.
 Maker = Callable[..., Problem]
-
 #: What the library refuses on purpose, or the system does: a message, never a traceback.
 REFUSED = (NeurosymError, OSError, NotImplementedError)
 
@@ -71,7 +66,7 @@ class Search:
         return self.status is Status.SOLVED
 
     @classmethod
-    def of(cls, result: PlanResult, query: Query, scores: OrderScores | None, *, stopped: bool = False) -> Search:
+    def of(cls, result: PlanResult, query: Query, scores: OrderScores | None, *, stopped: bool = False) -> Self:
         """What a planner answered to a query."""
         counts = {name: getattr(result, name) for name in COUNTS}
         if result.cost is not None:
@@ -87,13 +82,11 @@ class Search:
         return cls(steps, motions, result.status, sentence, result.blame, counts, settings, scores, why_not, undone)
 
     @classmethod
-    def saved(cls, saved: SavedPlan, scores: OrderScores | None) -> Search:
+    def saved(cls, saved: SavedPlan, scores: OrderScores | None) -> Self:
         """What a plan's file says of it. A plan that does not hold, by geometry asked anew, is none.
 
-        Plans that a simulation allowed are left to it (`neurosym replay`).
-
-        Raises:
-            InputError: the file's account of the search is not what `neurosym plan --out` writes.
+        Plans that a simulation allowed are left to it (`neurosym replay`). Raises InputError: the file's account of the
+        search is not what `neurosym plan --out` writes.
         """
         account = saved.account()
         status, sentence = account.status, account.status.sentence
@@ -121,7 +114,7 @@ class Exhibit:
     problem: Problem
     search: Search
     timeline: Timeline | None
-    pictures: NDArray[np.uint8] | None
+    pictures: Pixels | None
     notes: tuple[str, ...] = ()
 
     @property
@@ -133,7 +126,7 @@ class Exhibit:
         return tuple(name for name in self.timeline.names if name not in missing)
 
     @classmethod
-    def of(cls, problem: Problem, search: Search, notes: tuple[str, ...] = ()) -> Exhibit:
+    def of(cls, problem: Problem, search: Search, notes: tuple[str, ...] = ()) -> Self:
         """Stage the film and take the pictures, as far as the problem has them."""
         timeline, pictures = None, None
         try:
@@ -148,7 +141,7 @@ class Exhibit:
         return cls(problem, search, timeline, pictures, notes)
 
     @classmethod
-    def saved(cls, saved: SavedPlan) -> Exhibit:
+    def saved(cls, saved: SavedPlan) -> Self:
         """A plan from a file. Its prior is asked again; where that fails, a note says so."""
         scores, notes = None, []
         try:
@@ -159,10 +152,7 @@ class Exhibit:
 
 
 def _motions(problem: Problem, search: Search) -> tuple[StepMotion | None, ...]:
-    """The motions of a prefix, which a search without a plan does not say: each step is asked for once more.
-
-    Nothing where one is refused: another oracle than geometry may have allowed it.
-    """
+    """The motions of a prefix, which a search without a plan does not say: each step is asked for once more."""
     if search.solved:
         return ()
     grounded, motions = problem.ground(), []

@@ -1,7 +1,7 @@
 """One file that plays a plan without a server and without the network."""
 
-from __future__ import annotations
-
+import json
+from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 
@@ -11,7 +11,6 @@ from neurosym.errors import InputError
 from neurosym.support.files import write_text
 from neurosym.viewer import panels
 from neurosym.viewer.exhibit import Exhibit
-from neurosym.viewer.follow import follower
 from neurosym.viewer.scene import PlanScene
 from neurosym.viewer.score_table import scores_table
 from neurosym.viewer.server import LocalServer
@@ -19,10 +18,8 @@ from neurosym.viewer.steps import attempts, caption, most_refused, steps
 
 #: Scene updates a second of the recording, and seconds that a step takes.
 RATE, SECONDS_PER_STEP = 15, 1.5
-
 #: Seconds that the film rests at its beginning and its end, which it goes round and round.
 PAUSE = 1.0
-
 #: Width of the panel beside the view (CSS pixels).
 PANEL = 400
 
@@ -30,8 +27,7 @@ PANEL = 400
 def export_page(exhibit: Exhibit, path: str | Path) -> Path:
     """Write a self-contained page, whole or not at all; its folder is made. Returns the path.
 
-    Raises:
-        InputError: a problem that has no parts in space, or a file name that does not end in .html.
+    Raises InputError: a problem that has no parts in space, or a file name that does not end in .html.
     """
     path = Path(path)
     check_name(path)
@@ -93,3 +89,58 @@ def _with_panel(film: str, exhibit: Exhibit) -> str:
     aside = f"{style}<aside id='said'>{panels.styled(content)}</aside>{script}"
     before, body, after = film.replace("<title>Viser</title>", title, 1).rpartition("</body>")
     return f"{before}{aside}{body}{after}" if body else after + aside
+
+
+#: Times a second that the clock is read.
+LOOKS = 10
+
+
+def follower(captions: Sequence[str], pause: float, seconds_per_step: float) -> str:
+    """An HTML script that marks the step under way in `#steps`, says it in `#now`, and goes to a step that is clicked.
+
+    The player is viser's, and its clock a field with the seconds; where there is no such field, nothing happens.
+    Captions are HTML: before the first step, which is after a `pause` (seconds), one a step, and after the last.
+    """
+    texts = json.dumps(list(captions)).replace("<", "\\u003c")
+    settings = f"{texts}, {pause:g}, {seconds_per_step:g}, {len(captions) - 2}, {1000 // LOOKS}"
+    return f"<script>({_SCRIPT})({settings});</script>"
+
+
+_SCRIPT = """(captions, pause, each, total, wait) => {
+  const now = document.getElementById("now"), list = document.getElementById("steps");
+  const rows = [...list.querySelectorAll("li[data-step]")];
+  let marked = null;
+  const clock = () => {
+    const field = document.querySelector("#root input");
+    return field && field.value.trim() !== "" && isFinite(field.value) ? field : null;
+  };
+  const follow = () => {
+    const field = clock();
+    list.classList.toggle("live", field !== null);
+    if (field === null) return;
+    // The clock shows tenths: half of one more, and a step begins no later than its number.
+    const past = (Number(field.value) + 0.05 - pause) / each;
+    const step = past < 0 ? -1 : Math.min(Math.floor(past), total);
+    if (step === marked) return;
+    marked = step;
+    now.innerHTML = captions[step + 1];
+    for (const row of rows) {
+      const on = Number(row.dataset.step) === step;
+      row.classList.toggle("now", on);
+      if (!on) { row.removeAttribute("aria-current"); continue; }
+      row.setAttribute("aria-current", "step");
+      const over = row.getBoundingClientRect().top - list.getBoundingClientRect().top;
+      if (over < 0 || over > list.clientHeight - row.offsetHeight) list.scrollTop += over - list.clientHeight / 3;
+    }
+  };
+  list.addEventListener("click", (event) => {
+    const row = event.target.closest("li[data-step]"), field = clock();
+    if (!row || field === null) return;
+    // The player listens as to someone who types.
+    const type = Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, "value").set;
+    type.call(field, (pause + each * Number(row.dataset.step)).toFixed(1));
+    field.dispatchEvent(new Event("input", { bubbles: true }));
+    follow();
+  });
+  setInterval(follow, wait);
+}"""

@@ -1,7 +1,5 @@
 """What geometry knows of one part: what it touches, what blocks it in each direction, what it stands on and carries."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from dataclasses import dataclass
 
@@ -43,10 +41,7 @@ def part_facts(given: Assembly | AssemblyGeometry, name: str, there: Collection[
     """The facts about a part while only the parts named in `there` are in place.
 
     The first call for an `AssemblyGeometry` computes contacts and blocking between all pairs; later ones are bit
-    arithmetic.
-
-    Raises:
-        UnknownNameError: no such part.
+    arithmetic. Raises UnknownNameError: no such part.
     """
     geometry = AssemblyGeometry.of(given)
     assembly = geometry.assembly

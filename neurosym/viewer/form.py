@@ -1,7 +1,5 @@
 """The form for planning again: what it asks, what it says, and how it reads what was typed."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Mapping
 from typing import Any, TypeVar
@@ -74,11 +72,7 @@ class Form:
         self.takes.content = panels.styled(content)
 
     def asked(self) -> Query:
-        """What the form says.
-
-        Raises:
-            InputError: a field that is not what it should be.
-        """
+        """What the form says. Raises InputError: a field that is not what it should be."""
         seconds = self.seconds.value
         return Query(
             domain=self.domain.value,

@@ -1,7 +1,5 @@
 """The page: the 3D view, and beside it the plan, the prior, the search, facts about a part, and planning again."""
 
-from __future__ import annotations
-
 import contextlib
 import logging
 import threading
@@ -25,13 +23,11 @@ from neurosym.viewer.steps import BECAUSE, MOST_REFUSALS, TRIED, attempts, capti
 from neurosym.viewer.timeline import Timeline
 
 _log = logging.getLogger(__name__)
-
 #: Scene updates a second while the film plays, and seconds that a step takes at speed 1.
 RATE, SECONDS_PER_STEP = 30.0, 1.5
 
 SPEEDS = ("0.5×", "1×", "2×", "4×", "8×")
 NO_PART = "(no part)"
-
 #: Width of the panel beside the view (CSS pixels).
 PANEL = 420
 
@@ -85,8 +81,7 @@ class Page:
     def plan(self, query: Query, problem: Problem | None = None) -> None:
         """Plan in the background, the problem itself where it is made already; what comes out of it is shown.
 
-        Raises:
-            InputError: there is no such domain, planner or prior, or a search is under way.
+        Raises InputError: there is no such domain, planner or prior, or a search is under way.
         """
         with self._lock:
             if self.planning is not None and self.planning.running:

@@ -1,23 +1,18 @@
 """What stands beside the 3D view, as HTML: the search, pictures, facts about a part. Every name is escaped."""
 
-from __future__ import annotations
-
 import base64
 import io
 import json
 from collections.abc import Mapping, Sequence
 from html import escape
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
 from PIL import Image
 
+from neurosym.support.arrays import Pixels
+from neurosym.viewer.exhibit import Exhibit
 from neurosym.viewer.facts import PartFacts
-
-if TYPE_CHECKING:
-    from neurosym.viewer.exhibit import Exhibit
-    from neurosym.viewer.planning import Progress
+from neurosym.viewer.planning import Progress
 
 #: Width of pictures (CSS pixels), as wide as the panel beside the view.
 WIDTH = 360
@@ -51,7 +46,7 @@ def some(names: Sequence[str]) -> str:
     return ", ".join(names[:12]) + (f" and {len(names) - 12} more" if len(names) > 12 else "")
 
 
-def pictures(views: NDArray[np.uint8] | None) -> str:
+def pictures(views: Pixels | None) -> str:
     """The observation, one picture a view."""
     if views is None or not len(views):
         return "<p>There are no reference pictures.</p>"
@@ -143,7 +138,7 @@ _STYLE = (
 )
 
 
-def as_data(picture: NDArray[np.uint8]) -> str:
+def as_data(picture: Pixels) -> str:
     """A picture, uint8 (H, W, 3), as a data URI."""
     file = io.BytesIO()
     Image.fromarray(picture).save(file, format="PNG", optimize=True)

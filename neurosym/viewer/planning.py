@@ -1,7 +1,5 @@
 """Planning in a thread, which can be watched and stopped."""
 
-from __future__ import annotations
-
 import logging
 import threading
 import time
@@ -114,8 +112,7 @@ class Planning:
 def maker_of(domain: str, given: Mapping[str, Maker]) -> Maker:
     """What makes a domain's problems: of a number and options, or of options alone where the command line gave it.
 
-    Raises:
-        UnknownNameError: no such domain.
+    Raises UnknownNameError: no such domain.
     """
     return given[domain] if domain in given else load_domain(domain).problem
 
@@ -123,8 +120,7 @@ def maker_of(domain: str, given: Mapping[str, Maker]) -> Maker:
 def problem_maker(query: Query, given: Mapping[str, Maker]) -> Callable[[], Problem]:
     """A function that makes the problem of a query, where `given` makes those that the command line was given, by name.
 
-    Raises:
-        InputError: no such domain, no number where one is needed, or an option that the domain does not take.
+    Raises InputError: no such domain, no number where one is needed, or an option that the domain does not take.
     """
     make = maker_of(query.domain, given)
     check_options(make, query.options, query.domain)
@@ -139,9 +135,7 @@ def problem_maker(query: Query, given: Mapping[str, Maker]) -> Callable[[], Prob
 def check_query(query: Query) -> None:
     """Refuse at once what would be refused in the thread.
 
-    Raises:
-        UnknownNameError: a planner, a prior or an oracle that nobody offers.
-        InputError: a budget that is none.
+    Raises UnknownNameError: a planner, a prior or an oracle that nobody offers; InputError: a budget that is none.
     """
     named = [("planner", query.planner, planner_names()), ("oracle", query.oracle, ORACLES)]
     if query.prior is not None and not query.prior.endswith(".safetensors"):

@@ -1,42 +1,32 @@
 """The 3D view: a timeline's parts as nodes of a viser scene, moved by time."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable, Collection, Mapping
 
 import numpy as np
 import viser
-from numpy.typing import NDArray
 
 from neurosym.geometry.stability.spring_verdicts import ContactForces
 from neurosym.simulation.scene import part_colours
+from neurosym.support.arrays import Array
 from neurosym.viewer.solids import Solid, solids
 from neurosym.viewer.steps import HELD
 from neurosym.viewer.timeline import Timeline, floor_of
 
-Array = NDArray[np.float64]
 RGB = tuple[int, int, int]
-
 #: The largest extent of the work in the scene: cameras, lines and light need no thought of millimetres or metres.
 SIZE = 2.0
-
 #: More parts than this bear no names at first: they would hide the work.
 MOST_NAMES = 12
-
 #: How opaque parts are while another one is selected.
 FAINT = 0.22
-
 #: How many times as thick as others the outline of a part is that is held.
 HELD_BY = 3.0
-
 #: Turns a picture, which faces along -z with its top at -y, so that it lies face up with its top at +y.
 _UPWARD = (0.0, 1.0, 0.0, 0.0)
-
 #: The camera's field of view (radians, top to bottom), where it looks from (the front, a little from the right, from
 #: above), and how much more than all that is ever seen it takes in.
 FIELD_OF_VIEW, FROM, MARGIN = 0.7, np.array([0.35, -0.75, 0.56]), 1.05
-
 #: Light: colours (0..255) of the sky and of what the ground throws back, with their strength; strength of the sun, and
 #: where it stands. The viewer's film curve makes bright colours pale, so that no face may get more than about 4 in all.
 SKY, SUN, SUN_FROM = ((255, 255, 255), (165, 165, 170), 2.2), 2.0, np.array([-0.35, -0.6, 1.0])

@@ -1,22 +1,18 @@
 """A prior's order scores as a table, steps by actions, in HTML."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from html import escape
 
 import numpy as np
-from numpy.typing import NDArray
 
 from neurosym.planning.order_scores import OrderScores
+from neurosym.support.arrays import Array, Numbers
 from neurosym.viewer.panels import WIDTH, as_data
 
 #: A table of scores with more columns leaves out those that are neither likely at any step nor taken.
 MOST_COLUMNS = 24
-
 #: A table with more rows is drawn as a picture, without numbers and names.
 MOST_ROWS = 40
-
 #: Okabe and Ito's blue for probability, and vermilion for what was taken.
 _INK, _TAKEN = np.array([0, 90, 140]), "#D55E00"
 
@@ -45,9 +41,7 @@ def scores_table(scores: OrderScores | None, actions: Sequence[str], taken: Sequ
     return f"{drawn}<p class='quiet'>{legend}{shared}{left_out}</p>"
 
 
-def _by_class(
-    P: NDArray[np.float64], actions: Sequence[str], classes: Sequence[int]
-) -> tuple[NDArray[np.float64], list[str], dict[str, int]]:
+def _by_class(P: Array, actions: Sequence[str], classes: Sequence[int]) -> tuple[Array, list[str], dict[str, int]]:
     """A column a class, its probabilities summed; the columns' names; and the column of each action."""
     members: dict[int, list[int]] = {}
     for j, number in enumerate(classes):
@@ -57,14 +51,14 @@ def _by_class(
     return summed, names, {actions[j]: k for k, js in enumerate(members.values()) for j in js}
 
 
-def _columns_to_show(P: NDArray[np.float64], taken: Sequence[int]) -> NDArray[np.int64]:
+def _columns_to_show(P: Array, taken: Sequence[int]) -> Numbers:
     if P.shape[1] <= MOST_COLUMNS:
         return np.arange(P.shape[1])
     likely = np.argsort(-P.max(axis=0), kind="stable")[: max(MOST_COLUMNS - len(set(taken)), 0)]
     return np.unique(np.concatenate([likely, np.array(taken, dtype=np.int64)]))
 
 
-def _as_cells(P: NDArray[np.float64], names: Sequence[str], marks: Sequence[tuple[int, int]]) -> str:
+def _as_cells(P: Array, names: Sequence[str], marks: Sequence[tuple[int, int]]) -> str:
     """An SVG with a square a cell, its probability as a tooltip and, where there is room, as a number."""
     rows, columns = P.shape
     side = float(np.clip((WIDTH - 30) / max(columns, 1), 10, 44))
@@ -103,7 +97,7 @@ def _as_cells(P: NDArray[np.float64], names: Sequence[str], marks: Sequence[tupl
     )
 
 
-def _as_picture(P: NDArray[np.float64], marks: Sequence[tuple[int, int]]) -> str:
+def _as_picture(P: Array, marks: Sequence[tuple[int, int]]) -> str:
     """A large table as a picture, a pixel a cell, what was taken in colour."""
     colours = np.rint(255 + (_INK - 255) * np.sqrt(P)[..., None]).astype(np.uint8)
     for i, j in marks:

@@ -1,7 +1,5 @@
 """The local server: viser, quiet, on loopback, for its own page alone, without the tunnel that shares a page."""
 
-from __future__ import annotations
-
 import contextlib
 import functools
 import io
@@ -39,10 +37,7 @@ class LocalServer(viser.ViserServer):
 
 @contextlib.contextmanager
 def _own_page_only(wanted: bool) -> Iterator[None]:
-    """Servers started inside refuse a web socket that a page of another origin opens: any site could, to read along.
-
-    viser has no option for it, so the function that it starts them with is given the origins here.
-    """
+    """Servers started inside refuse a web socket that a page of another origin opens: any site could, to read along."""
     serve = websockets.asyncio.server.serve
     if wanted:
         narrowed = functools.partial(serve, origins=[None, _OWN_PAGE])

@@ -1,21 +1,16 @@
 """Parts as triangles and outlines to draw, in the world, at rest in the work."""
 
-from __future__ import annotations
-
 from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.shapes import Box
-
-Array = NDArray[np.float64]
+from neurosym.support.arrays import Array, Numbers, Truths
 
 #: Edges at which the surface bends by less than this (degrees) are not outlined: facets of something round.
 SHARP = 30.0
-
 #: Corners nearer than this, as a share of the smallest extent of any body, are one.
 SAME = 1e-4
 
@@ -25,7 +20,7 @@ class Solid:
     """A part in the world: float64 (n, 3) vertices, int64 (m, 3) outward faces, float64 (k, 2, 3) sharp edges."""
 
     vertices: Array
-    faces: NDArray[np.int64]
+    faces: Numbers
     outline: Array
 
 
@@ -47,14 +42,8 @@ def _solid(assembly: Assembly, part: int) -> Solid:
     return Solid(v, f, _outline(v, f))
 
 
-def _merged(
-    vertices: Array, faces: NDArray[np.int64], of_box: NDArray[np.bool_], grid: float
-) -> tuple[Array, NDArray[np.int64]]:
-    """The same triangles with corners shared, and without the faces of boxes that cover one another.
-
-    Args:
-        of_box: bool (m,): which triangles are a box's; those come in pairs, a face each.
-    """
+def _merged(vertices: Array, faces: Numbers, of_box: Truths, grid: float) -> tuple[Array, Numbers]:
+    """The same triangles with corners shared, and without the faces of boxes that cover one another."""
     _, first, which = np.unique(np.round(vertices / grid), axis=0, return_index=True, return_inverse=True)
     f = which.ravel()[faces]
     sides = f[of_box].reshape(-1, 6)
@@ -67,7 +56,7 @@ def _merged(
     return vertices[first], kept[solid]
 
 
-def _outline(vertices: Array, faces: NDArray[np.int64]) -> Array:
+def _outline(vertices: Array, faces: Numbers) -> Array:
     """float64 (k, 2, 3): edges of one face, of more than two, or of two that meet at an angle."""
     a, b, c = (vertices[faces[:, k]] for k in range(3))
     normal = np.cross(b - a, c - a)

@@ -1,7 +1,5 @@
 """What `neurosym view` is pointed at: a problem family, the file of a plan, or a user's own assembly."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial, wraps
@@ -18,7 +16,6 @@ from neurosym.viewer.planning import problem_maker
 
 #: The family of assemblies that are files, and the prior that such a one is given where nobody names one.
 ASSEMBLY, UNTRAINED = "assembly", "outermost-first"
-
 #: What a puzzle of the user's own is called on the page.
 PUZZLE = "your puzzle"
 
@@ -41,11 +38,9 @@ class Source:
 def open_source(query: Query, cells: Mapping[str, Any] | None = None, reading: Reading | None = None) -> Source:
     """Open the domain, or the file at the path, that `query.domain` names; a path wins where no problem is named.
 
-    The domain may get cells, {name: [(x, y, z), ...]}, for a puzzle of the user's own; an assembly its reading.
-
-    Raises:
-        UnknownNameError: neither a domain nor a path.
-        InputError: a file that is neither a plan nor an assembly; a reading with anything but an assembly.
+    The domain may get cells, {name: [(x, y, z), ...]}, for a puzzle of the user's own; an assembly its reading. Raises
+    UnknownNameError: neither a domain nor a path; InputError: a file that is neither a plan nor an assembly; a reading
+    with anything but an assembly.
     """
     path, reading = Path(query.domain), reading or Reading()
     if path.exists() and query.number is None and cells is None:

@@ -1,30 +1,21 @@
 """The steps of a plan, in a line and as a list, and the attempts of its search, as HTML. Every name is escaped."""
 
-from __future__ import annotations
-
 from collections import Counter
 from html import escape
-from typing import TYPE_CHECKING
 
+from neurosym.geometry.step_motion import StepMotion
+from neurosym.language.search_problem import Rejection
+from neurosym.viewer.exhibit import Exhibit, Search
 from neurosym.viewer.panels import some
-
-if TYPE_CHECKING:
-    from neurosym.geometry.step_motion import StepMotion
-    from neurosym.language.search_problem import Rejection
-    from neurosym.viewer.exhibit import Exhibit, Search
 
 #: While a step of a longer list is under way, so many before it and after it are listed, to keep it in sight.
 BEFORE, AFTER = 6, 20
-
 #: Colour (0..255) of what is held while a step is done: its outline in the view, its name in the caption.
 HELD = (170, 0, 120)
-
 #: Refusals written out at a time; a hard search has thousands.
 MOST_REFUSALS = 300
-
 #: With more refusals than this, those that were refused most often are counted first, so many of them.
 FEW, MOST_COUNTED = 30, 8
-
 #: Colours (0..255) of what was refused, and of what the refusal is due to.
 TRIED, BECAUSE = (213, 94, 0), (0, 114, 178)
 

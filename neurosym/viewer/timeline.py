@@ -5,13 +5,10 @@ rows in the order of the plan; a group that leaves together is set down as one, 
 it there. A plan that puts together is the film of its reverse, run backwards.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from neurosym.errors import InputError
@@ -20,16 +17,13 @@ from neurosym.geometry.queries import AssemblyGeometry
 from neurosym.geometry.rigid_motions import shifted
 from neurosym.geometry.staging import Staging
 from neurosym.geometry.step_motion import Track
-
-Array = NDArray[np.float64]
+from neurosym.support.arrays import Array, Numbers, Pixels, Truths
 
 #: Share of a step's time that the path of the plan takes; the rest is the carrying to or from the place before it.
 ON_PATH = 0.65
-
 #: Space between what is set down (a share of the parts' median width), and between it and the work (a share of the
 #: work's largest extent).
 GAP, CLEAR = 0.35, 0.35
-
 #: Where a part is between two steps: nowhere, in the work, or set down before it.
 ABSENT, IN_PLACE, APART = 0, 1, 2
 
@@ -68,7 +62,7 @@ class Timeline:
         back = -1 if self.backwards else 1
         self.where, self.shifts = self._where[::back], self._shifts[::back]
 
-    def _between_steps(self, present: Sequence[int]) -> tuple[NDArray[np.uint8], Array]:
+    def _between_steps(self, present: Sequence[int]) -> tuple[Pixels, Array]:
         """`where` and `shifts`; what is to arrive waits before the work."""
         n, places = len(self.names), _rows_before(self.staging.assembly, self._movers, self.backwards)
         where, shifts = np.zeros((self.n_steps + 1, n), dtype=np.uint8), np.zeros((self.n_steps + 1, n, 3))
@@ -114,7 +108,7 @@ class Timeline:
             turns[turned] = Rotation.from_matrix(X[turned, :3, :3]).as_quat()[:, [3, 0, 1, 2]]
         return positions, turns
 
-    def visible(self, t: float) -> NDArray[np.bool_]:
+    def visible(self, t: float) -> Truths:
         """bool (n_parts,): which parts are to be seen at time t."""
         t = self._within(t)
         step = int(np.floor(t))
@@ -190,7 +184,7 @@ def floor_of(assembly: Assembly) -> float:
     return assembly.ground if assembly.has_table else float(assembly.bounds[0, 2])
 
 
-def _rows_before(assembly: Assembly, groups: Sequence[NDArray[np.int64]], backwards: bool) -> Array:
+def _rows_before(assembly: Assembly, groups: Sequence[Numbers], backwards: bool) -> Array:
     """Shifts, float64 (n_groups, 3), that set groups of parts down in rows before the work, towards -y, left to right.
 
     The groups, numbers of parts, are in the order of the rows, or `backwards` against it.

@@ -1,18 +1,15 @@
 """The Franka Panda that ships with PyBullet: its joints, its hand, and inverse kinematics. Lengths are metres."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from neurosym.geometry.rigid_motions import posed
 from neurosym.simulation.client import Client
 from neurosym.simulation.solids import matrix, quaternion
 from neurosym.simulation.window import Shown
-
-Array = NDArray[np.float64]
+from neurosym.support.arrays import Array
 
 #: Numbers of the arm's seven joints, the two fingers, and the point between the fingertips.
 JOINTS = tuple(range(7))
@@ -35,9 +32,6 @@ FINGER_FRICTION = 1.5
 class PandaArm:
     """An arm on its base at the origin, looking along +x, in one simulator.
 
-    Args:
-        client: the simulator.
-
     Attributes:
         body: the simulator's number of the arm.
         lower, upper: float64 (7,): limits of the joints (radians), a little inside the true ones.
@@ -48,48 +42,42 @@ class PandaArm:
         import pybullet_data
 
         self._p: Any = client.p
-        self._c = client.id
         urdf = Path(pybullet_data.getDataPath()) / "franka_panda" / "panda.urdf"
-        self.body: int = self._p.loadURDF(str(urdf), useFixedBase=True, physicsClientId=self._c)
-        info = [self._p.getJointInfo(self.body, j, physicsClientId=self._c) for j in JOINTS]
+        self.body: int = self._p.loadURDF(str(urdf), useFixedBase=True)
+        info = [self._p.getJointInfo(self.body, j) for j in JOINTS]
         low, high = np.array([i[8] for i in info]), np.array([i[9] for i in info])
         self.lower, self.upper = low + _SLACK * (high - low), high - _SLACK * (high - low)
         self.speed = np.array([i[11] for i in info])
         for finger in FINGERS:
-            self._p.changeDynamics(
-                self.body, finger, lateralFriction=FINGER_FRICTION, spinningFriction=0.01, physicsClientId=self._c
-            )
+            self._p.changeDynamics(self.body, finger, lateralFriction=FINGER_FRICTION, spinningFriction=0.01)
         self.put(HOME, WIDEST)
         # The real hand drives both fingers by one motor.
         gear = self._p.createConstraint(
-            self.body, FINGERS[0], self.body, FINGERS[1], self._p.JOINT_GEAR, (1, 0, 0), (0, 0, 0), (0, 0, 0),
-            physicsClientId=self._c,
+            self.body, FINGERS[0], self.body, FINGERS[1], self._p.JOINT_GEAR, (1, 0, 0), (0, 0, 0), (0, 0, 0)
         )  # fmt: skip
-        self._p.changeConstraint(gear, gearRatio=-1, erp=0.1, maxForce=50, physicsClientId=self._c)
+        self._p.changeConstraint(gear, gearRatio=-1, erp=0.1, maxForce=50)
 
     @property
     def joints(self) -> Array:
         """float64 (7,): where the joints are now."""
-        states = self._p.getJointStates(self.body, JOINTS, physicsClientId=self._c)
+        states = self._p.getJointStates(self.body, JOINTS)
         return np.array([s[0] for s in states])
 
     @property
     def width(self) -> float:
         """How far apart the fingers are now."""
-        return float(sum(s[0] for s in self._p.getJointStates(self.body, FINGERS, physicsClientId=self._c)))
+        return float(sum(s[0] for s in self._p.getJointStates(self.body, FINGERS)))
 
     @property
     def X_WT(self) -> Array:
         """float64 (4, 4): pose of the tool, the point between the fingertips; its z points where the fingers do."""
-        state = self._p.getLinkState(self.body, TOOL, computeForwardKinematics=True, physicsClientId=self._c)
+        state = self._p.getLinkState(self.body, TOOL, computeForwardKinematics=True)
         return matrix(state[4], state[5])
 
     def looks(self) -> list[tuple[int, Shown]]:
         """The numbers of the links that can be seen (-1 is the base), and what they look like."""
         found = []
-        for _, link, kind, _, file, at, turn, rgba, *_ in self._p.getVisualShapeData(
-            self.body, physicsClientId=self._c
-        ):
+        for _, link, kind, _, file, at, turn, rgba, *_ in self._p.getVisualShapeData(self.body):
             if kind == self._p.GEOM_MESH:
                 found.append((int(link), Shown(tuple(rgba[:3]), mesh=(file.decode(), at, turn))))
         return found
@@ -97,19 +85,19 @@ class PandaArm:
     def frame(self, link: int) -> tuple[float, ...]:
         """Position and quaternion (x, y, z, w) of a link now, seven numbers."""
         if link < 0:
-            at, turn = self._p.getBasePositionAndOrientation(self.body, physicsClientId=self._c)
+            at, turn = self._p.getBasePositionAndOrientation(self.body)
         else:
-            state = self._p.getLinkState(self.body, link, computeForwardKinematics=True, physicsClientId=self._c)
+            state = self._p.getLinkState(self.body, link, computeForwardKinematics=True)
             at, turn = state[4], state[5]
         return (*at, *turn)
 
     def put(self, q: Array, width: float | None = None) -> None:
         """Set the joints, and the fingers, at once and at rest: for thinking, not for acting."""
         for joint, value in zip(JOINTS, q.tolist()):
-            self._p.resetJointState(self.body, joint, value, physicsClientId=self._c)
+            self._p.resetJointState(self.body, joint, value)
         if width is not None:
             for finger in FINGERS:
-                self._p.resetJointState(self.body, finger, width / 2, physicsClientId=self._c)
+                self._p.resetJointState(self.body, finger, width / 2)
 
     def drive(self, q: Array) -> None:
         """Let the joints' motors go for a configuration."""
@@ -120,20 +108,13 @@ class PandaArm:
             targetPositions=q.tolist(),
             forces=[87.0] * 4 + [12.0] * 3,
             positionGains=[0.2] * 7,
-            physicsClientId=self._c,
         )
 
     def squeeze(self, width: float, force: float) -> None:
         """Let the fingers go for a width, each with at most `force` (newtons)."""
         for finger in FINGERS:
             self._p.setJointMotorControl2(
-                self.body,
-                finger,
-                self._p.POSITION_CONTROL,
-                targetPosition=width / 2,
-                force=force,
-                maxVelocity=0.05,
-                physicsClientId=self._c,
+                self.body, finger, self._p.POSITION_CONTROL, targetPosition=width / 2, force=force, maxVelocity=0.05
             )
 
     def inverse(self, X_WT: Array, seed: Array) -> Array | None:
@@ -153,7 +134,6 @@ class PandaArm:
                 quaternion(X_WT[:3, :3]).tolist(),
                 maxNumIterations=60,
                 residualThreshold=1e-5,
-                physicsClientId=self._c,
             )
             q = np.asarray(np.clip(solved[:7], self.lower, self.upper))
             self.put(q)
@@ -165,18 +145,11 @@ class PandaArm:
 
     def meets_itself(self) -> bool:
         """Whether the wrist or the hand touches the lower arm or the base, where the joints are now."""
-        return any(
-            self._p.getClosestPoints(self.body, self.body, 0.0, far, near, physicsClientId=self._c)
-            for far in _FAR
-            for near in _NEAR
-        )
+        return any(self._p.getClosestPoints(self.body, self.body, 0.0, far, near) for far in _FAR for near in _NEAR)
 
 
 def from_above(position: Array, yaw: float) -> Array:
     """float64 (4, 4): a tool pose at a position (3,), pointing straight down; fingers open along y turned by `yaw`."""
     c, s = np.cos(yaw), np.sin(yaw)
-    X = np.eye(4)
     # z down; x and y turned about the vertical, mirrored so that the frame stays right-handed.
-    X[:3, :3] = [[c, s, 0], [s, -c, 0], [0, 0, -1]]
-    X[:3, 3] = position
-    return X
+    return posed(np.array([[c, s, 0], [s, -c, 0], [0, 0, -1]]), position)

@@ -5,17 +5,15 @@ a perfect camera would tell; every grasp starts from where the block really lies
 sits in the hand.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from neurosym.errors import InputError
 from neurosym.geometry.assembly import Assembly
+from neurosym.geometry.rigid_motions import posed
 from neurosym.geometry.shapes import Box
 from neurosym.geometry.staging import Staging
 from neurosym.simulation.panda.arm import WIDEST, from_above
@@ -24,8 +22,7 @@ from neurosym.simulation.panda.hand import APPROACH, CAREFUL, Failed, Hand, lift
 from neurosym.simulation.panda.report import BuildReport, BuildSettings, Placement
 from neurosym.simulation.panda.watching import CellWindow
 from neurosym.simulation.scene import part_colours
-
-Array = NDArray[np.float64]
+from neurosym.support.arrays import Array
 
 #: How far below a block's top the fingertips' middle grasps, at most.
 DEPTH = 0.025
@@ -80,7 +77,7 @@ def build_with_panda(
             if not placements[-1].ok:
                 break
         hand.go_home()
-        standing = tuple(n for n in names if builder.off(n)[0] and _tried(n, placements))
+        standing = tuple(n for n in names if builder.off(n)[0] and any(p.block == n for p in placements))
         found = {n: _in_assembly(world.pose(n), staging.assembly, chosen) for n in sizes}
         units = {n: size / chosen.metres for n, size in sizes.items()}
         return BuildReport(tuple(placements), len(names), found, standing, hand.seconds, units)
@@ -89,20 +86,17 @@ def build_with_panda(
 def starting_places(names: Sequence[str], sizes: Mapping[str, Array], rng: np.random.Generator) -> dict[str, Array]:
     """Blocks in rows to the left and the right of the arm, a little askew: name -> float64 (4, 4), metres.
 
-    Raises:
-        InputError: more blocks than there is room for.
+    Raises InputError: more blocks than there is room for.
     """
     spots = [(x, side * y) for y in (0.20, 0.33) for x in (0.36, 0.49, 0.62) for side in (1, -1)]
     if len(names) > len(spots):
         raise InputError(f"Expected at most {len(spots)} blocks, which have room beside the arm; got {len(names)}.")
-    found = {}
+    starts = {}
     for name, spot in zip(names, (spots[i] for i in rng.permutation(len(names)))):
         yaw, shift = rng.uniform(-0.35, 0.35), rng.uniform(-0.01, 0.01, 2)
-        X = np.eye(4)
-        X[:2, :2] = [[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]]
-        X[:3, 3] = spot[0] + shift[0], spot[1] + shift[1], sizes[name][2] / 2
-        found[name] = X
-    return found
+        turn = np.array([[np.cos(yaw), -np.sin(yaw), 0], [np.sin(yaw), np.cos(yaw), 0], [0, 0, 1]])
+        starts[name] = posed(turn, (spot[0] + shift[0], spot[1] + shift[1], sizes[name][2] / 2))
+    return starts
 
 
 def _blocks(staging: Staging, settings: BuildSettings) -> tuple[dict[str, Array], dict[str, Array]]:
@@ -135,10 +129,6 @@ def _in_assembly(X: Array, assembly: Assembly, settings: BuildSettings) -> Array
     return found
 
 
-def _tried(name: str, placements: Sequence[Placement]) -> bool:
-    return any(p.block == name for p in placements)
-
-
 class _Builder:
     """Brings one block after another, by what the hand can do."""
 
@@ -157,8 +147,10 @@ class _Builder:
                 self.hand.retreat()
                 continue
             ok, error, tilt = self.off(name)
-            said = "It stands in its place." if ok else f"It lies {1000 * error:.0f} mm and {tilt:.0f}° off its place."
-            return Placement(name, ok, said, attempt, error, tilt)
+            reason = (
+                "It stands in its place." if ok else f"It lies {1000 * error:.0f} mm and {tilt:.0f}° off its place."
+            )
+            return Placement(name, ok, reason, attempt, error, tilt)
         return Placement(name, False, reason, self.settings.attempts)
 
     def off(self, name: str) -> tuple[bool, float, float]:

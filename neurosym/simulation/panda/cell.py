@@ -3,21 +3,17 @@
 Everything is at its true size in metres, at 1/240 s a step. The table is the plane z = 0, the arm stands at the origin.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from neurosym.simulation.client import Client, Closeable
 from neurosym.simulation.panda.arm import PandaArm
 from neurosym.simulation.scene import RGB
 from neurosym.simulation.solids import matrix, quaternion
-
-Array = NDArray[np.float64]
+from neurosym.support.arrays import Array
 
 TIME_STEP = 1 / 240
 #: Small bodies that touch many others want more of the contact solver than Bullet's usual 50.
@@ -43,14 +39,9 @@ class Load:
 class Cell(Closeable):
     """Table, blocks and arm (a context manager).
 
-    Args:
-        sizes: name of a block -> float64 (3,), its edges.
-        poses: name of a block -> float64 (4, 4), where it lies at first.
-        friction: between any two blocks, and of blocks on the table.
-        colours: name of a block -> RGB in 0..1, for those who watch.
-
-    Attributes:
-        watchers: called with the cell after each time step.
+    `sizes`: name of a block -> float64 (3,), its edges. `poses`: name of a block -> float64 (4, 4), where it lies at
+    first. `friction`: between any two blocks, and of blocks on the table. `colours`: name of a block -> RGB in 0..1,
+    for those who watch. `watchers`: called with the cell after each time step.
     """
 
     def __init__(
@@ -66,7 +57,6 @@ class Cell(Closeable):
         self.watchers: list[Callable[[Cell], None]] = []
         self.client = Client()
         self._p: Any = self.client.p
-        self._c = self.client.id
         try:
             self._build(poses, friction)
         except BaseException:
@@ -74,32 +64,29 @@ class Cell(Closeable):
             raise
 
     def _build(self, poses: Mapping[str, Array], friction: float) -> None:
-        p, c = self._p, self._c
-        p.setGravity(0, 0, -9.81, physicsClientId=c)
+        p = self._p
+        p.setGravity(0, 0, -9.81)
         p.setPhysicsEngineParameter(
-            fixedTimeStep=TIME_STEP,
-            numSolverIterations=SOLVER_ITERATIONS,
-            deterministicOverlappingPairs=1,
-            physicsClientId=c,
+            fixedTimeStep=TIME_STEP, numSolverIterations=SOLVER_ITERATIONS, deterministicOverlappingPairs=1
         )
-        plane = p.createCollisionShape(p.GEOM_PLANE, physicsClientId=c)
+        plane = p.createCollisionShape(p.GEOM_PLANE)
         # Only looks: the table is the whole plane.
         half = [0.45, 0.55, 0.01]
         slab = p.createVisualShape(
-            p.GEOM_BOX, halfExtents=half, visualFramePosition=_TABLE, rgbaColor=[0.87, 0.87, 0.84, 1], physicsClientId=c
+            p.GEOM_BOX, halfExtents=half, visualFramePosition=_TABLE, rgbaColor=[0.87, 0.87, 0.84, 1]
         )
-        self._table = p.createMultiBody(0, plane, slab, physicsClientId=c)
+        self._table = p.createMultiBody(0, plane, slab)
         surface = float(np.sqrt(friction))
-        p.changeDynamics(self._table, -1, lateralFriction=surface, physicsClientId=c)
+        p.changeDynamics(self._table, -1, lateralFriction=surface)
         self.arm = PandaArm(self.client)
         self._blocks: dict[str, int] = {}
         for name, size in self.sizes.items():
             half = (size / 2).tolist()
-            shape = p.createCollisionShape(p.GEOM_BOX, halfExtents=half, physicsClientId=c)
+            shape = p.createCollisionShape(p.GEOM_BOX, halfExtents=half)
             rgba = [*self.colours[name], 1.0]
-            visual = p.createVisualShape(p.GEOM_BOX, halfExtents=half, rgbaColor=rgba, physicsClientId=c)
-            number = p.createMultiBody(DENSITY * float(np.prod(size)), shape, visual, physicsClientId=c)
-            p.changeDynamics(number, -1, lateralFriction=surface, spinningFriction=0.001, physicsClientId=c)
+            visual = p.createVisualShape(p.GEOM_BOX, halfExtents=half, rgbaColor=rgba)
+            number = p.createMultiBody(DENSITY * float(np.prod(size)), shape, visual)
+            p.changeDynamics(number, -1, lateralFriction=surface, spinningFriction=0.001)
             self._blocks[name] = number
             self.put(name, poses[name])
 
@@ -109,56 +96,53 @@ class Cell(Closeable):
 
     def pose(self, block: str) -> Array:
         """float64 (4, 4): where a block lies now."""
-        return matrix(*self._p.getBasePositionAndOrientation(self._blocks[block], physicsClientId=self._c))
+        return matrix(*self._p.getBasePositionAndOrientation(self._blocks[block]))
 
     def frames(self) -> dict[str, tuple[float, ...]]:
         """Position and quaternion (x, y, z, w) of each block now, seven numbers."""
-        p, c = self._p, self._c
-        frames = {n: p.getBasePositionAndOrientation(i, physicsClientId=c) for n, i in self._blocks.items()}
+        p = self._p
+        frames = {n: p.getBasePositionAndOrientation(i) for n, i in self._blocks.items()}
         return {name: (*at, *turn) for name, (at, turn) in frames.items()}
 
     def put(self, block: str, X: Array) -> None:
         """Set a block's pose at once."""
         turn = quaternion(X[:3, :3]).tolist()
         number = self._blocks[block]
-        self._p.resetBasePositionAndOrientation(number, X[:3, 3].tolist(), turn, physicsClientId=self._c)
+        self._p.resetBasePositionAndOrientation(number, X[:3, 3].tolist(), turn)
 
     def step(self, steps: int = 1) -> None:
         """Let time pass."""
         for _ in range(steps):
-            self._p.stepSimulation(physicsClientId=self._c)
+            self._p.stepSimulation()
             for watcher in self.watchers:
                 watcher(self)
 
     def pinched(self, block: str) -> bool:
         """Whether both fingers touch a block now."""
-        touching = self._p.getContactPoints(self.arm.body, self._blocks[block], physicsClientId=self._c)
+        touching = self._p.getContactPoints(self.arm.body, self._blocks[block])
         return {9, 10} <= {point[3] for point in touching}
 
     def is_free(self, q: Array, load: Load | None = None, ignored: Collection[str] = ()) -> bool:
         """Whether the arm, and what it carries, would touch nothing at a configuration: to be asked in thought only.
 
-        Args:
-            q: float64 (7,).
-            load: what it carries.
-            ignored: names of blocks that the arm may touch.
+        `q`: float64 (7,). `load`: what it carries. `ignored`: names of blocks that the arm may touch.
         """
-        p, c, arm = self._p, self._c, self.arm
+        p, arm = self._p, self.arm
         arm.put(q)
         for name, number in self._blocks.items():
             if name in ignored or (load is not None and name == load.name):
                 continue
-            if p.getClosestPoints(arm.body, number, MARGIN, physicsClientId=c):
+            if p.getClosestPoints(arm.body, number, MARGIN):
                 return False
         # The base stands on the table.
-        if any(point[3] > 0 for point in p.getClosestPoints(arm.body, self._table, TABLE_MARGIN, physicsClientId=c)):
+        if any(point[3] > 0 for point in p.getClosestPoints(arm.body, self._table, TABLE_MARGIN)):
             return False
         if load is not None:
             self.put(load.name, arm.X_WT @ load.X_TB)
             held = self._blocks[load.name]
-            if p.getClosestPoints(held, self._table, TABLE_MARGIN, physicsClientId=c):
+            if p.getClosestPoints(held, self._table, TABLE_MARGIN):
                 return False
             others = [number for name, number in self._blocks.items() if name != load.name and name not in ignored]
-            if any(p.getClosestPoints(held, number, MARGIN, physicsClientId=c) for number in others):
+            if any(p.getClosestPoints(held, number, MARGIN) for number in others):
                 return False
         return not arm.meets_itself()

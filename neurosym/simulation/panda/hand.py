@@ -3,19 +3,15 @@
 Each motion is thought through in a second cell first, where asking whether something is touched changes nothing.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from neurosym.geometry.paths.joint_motion import plan_joint_motion
 from neurosym.simulation.panda.arm import HOME, WIDEST
 from neurosym.simulation.panda.cell import TIME_STEP, Cell, Load
-
-Array = NDArray[np.float64]
+from neurosym.support.arrays import Array
 
 #: Of each finger when it opens (newtons).
 OPENING_FORCE = 30.0
@@ -38,11 +34,8 @@ class Failed(Exception):
 class Hand:
     """Moves the arm in the world, after having thought it through in another cell.
 
-    Args:
-        world: where it acts.
-        thought: where it thinks.
-        rng: elbows, and what OMPL draws.
-        force: of each finger when it holds (newtons).
+    `world`: where it acts. `thought`: where it thinks. `rng`: elbows, and what OMPL draws. `force`: of each finger when
+    it holds (newtons).
     """
 
     def __init__(self, world: Cell, thought: Cell, rng: np.random.Generator, force: float) -> None:
@@ -69,10 +62,8 @@ class Hand:
     ) -> tuple[Array, list[Array]] | None:
         """The first of some tool poses that the arm reaches straight from above, and joints on the way down to it.
 
-        Args:
-            load: what the arm carries.
-            ignored: names of blocks that the arm may touch.
-            unasked: so many configurations at the end of the way may touch something.
+        `load`: what the arm carries. `ignored`: names of blocks that the arm may touch. `unasked`: so many
+        configurations at the end of the way may touch something.
         """
         arm = self.thought.arm
         spread = np.array([1.0, 0.5, 1.2, 0.4, 1.2, 0.5, 0.6])
@@ -91,11 +82,7 @@ class Hand:
         return None
 
     def transit(self, goal: Array, load: Load | None, where: str) -> None:
-        """Go to a configuration, past everything.
-
-        Raises:
-            Failed: no free motion was found to get `where`.
-        """
+        """Go to a configuration, past everything. Raises Failed: no free motion was found to get `where`."""
         path = self._planned(self.world.arm.joints, goal, load)
         if path is None:
             raise Failed(f"No free motion of the arm was found to get {where}.")
@@ -152,8 +139,7 @@ class Hand:
     def close(self, name: str, width: float) -> None:
         """Take hold of a block that is so wide between the fingers.
 
-        Raises:
-            Failed: both fingers do not touch it then.
+        Raises Failed: both fingers do not touch it then.
         """
         self.world.arm.squeeze(max(0.0, width - PRESS), self.force)
         self.wait(180)

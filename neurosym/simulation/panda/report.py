@@ -1,18 +1,14 @@
 """How the arm is to work, and what came of it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from neurosym.errors import InputError
 from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.shapes import boxes_part
-
-Array = NDArray[np.float64]
+from neurosym.support.arrays import Array
 
 
 @dataclass(frozen=True)
@@ -40,13 +36,9 @@ class BuildSettings:
 class Placement:
     """What became of one block.
 
-    Attributes:
-        block: its name.
-        ok: it stands where it is to stand.
-        reason: one sentence; says what went wrong where something did.
-        attempts: grasps tried.
-        error: how far its centre was from its place when it had been let go (metres); None when it never got there.
-        tilt: how far it was from upright (degrees).
+    `block`: its name. `ok`: it stands where it is to stand. `reason`: one sentence; says what went wrong where
+    something did. `attempts`: grasps tried. `error`: how far its centre was from its place when it had been let go
+    (metres); None when it never got there. `tilt`: how far it was from upright (degrees).
     """
 
     block: str
@@ -61,12 +53,9 @@ class Placement:
 class BuildReport:
     """What the arm did. Truthy exactly when every block stands in its place at the end.
 
-    Attributes:
-        placements: one a block that was tried, in order; after a failure no other is tried.
-        planned: how many blocks the plan has.
-        poses: name -> float64 (4, 4), where every block lies at the end, in the assembly's frame and unit.
-        standing: names of the blocks that stand in their place at the end.
-        seconds: simulated time.
+    `placements`: one a block that was tried, in order; after a failure no other is tried. `planned`: how many blocks
+    the plan has. `poses`: name -> float64 (4, 4), where every block lies at the end, in the assembly's frame and unit.
+    `standing`: names of the blocks that stand in their place at the end. `seconds`: simulated time.
     """
 
     placements: tuple[Placement, ...]
@@ -84,11 +73,7 @@ class BuildReport:
         return self.ok
 
     def built(self) -> Assembly:
-        """The blocks that stand in their place, exactly as they stand, for pictures.
-
-        Raises:
-            InputError: none does.
-        """
+        """The blocks that stand in their place, exactly as they stand, for pictures. Raises InputError: none does."""
         if not self.standing:
             raise InputError("Expected at least one block that stands in its place; none does.")
         parts = [boxes_part(n, np.zeros((1, 3)), self.sizes[n], self.poses[n]) for n in self.standing]

@@ -1,19 +1,13 @@
 """Watching the arm at work: in a window, or as a film."""
 
-from __future__ import annotations
-
 import numpy as np
-from numpy.typing import NDArray
 
-from neurosym.simulation.drawing import drawn
+from neurosym.simulation.drawing import LIGHT, drawn
 from neurosym.simulation.film_files import RATE
 from neurosym.simulation.looks import Camera, aimed
 from neurosym.simulation.panda.cell import TIME_STEP, Cell
-from neurosym.simulation.shading import LIGHT
 from neurosym.simulation.window import Shown, Spectator, Window
-
-Array = NDArray[np.float64]
-Picture = NDArray[np.uint8]
+from neurosym.support.arrays import Array, Pixels
 
 #: From where the arm is watched: opposite it, a little from its left.
 CAMERA = Camera(38, 24, field_of_view=30.0)
@@ -27,8 +21,7 @@ _OVERSAMPLING = 2
 class CellWindow(Spectator):
     """Shows a cell in a window, in real time (a context manager).
 
-    Raises:
-        NeurosymError: there is no screen, or no OpenGL.
+    Raises NeurosymError: there is no screen, or no OpenGL.
     """
 
     def __init__(self, cell: Cell) -> None:
@@ -49,16 +42,12 @@ class CellWindow(Spectator):
 class CellFilm:
     """Pictures of a cell while time passes, `RATE` of them a second of film; to be called after each time step.
 
-    Args:
-        size: width and height in pixels, even numbers.
-        speed: seconds that pass in a second of film.
-
-    Attributes:
-        pictures: uint8 (height, width, 3) each.
+    `size`: width and height in pixels, even numbers. `speed`: seconds that pass in a second of film. `pictures`: uint8
+    (height, width, 3) each.
     """
 
     def __init__(self, size: tuple[int, int] = (640, 480), speed: float = 4.0) -> None:
-        self.size, self.pictures = size, list[Picture]()
+        self.size, self.pictures = size, list[Pixels]()
         self._every, self._steps = max(1, round(speed / RATE / TIME_STEP)), 0
 
     def __call__(self, cell: Cell) -> None:
@@ -67,7 +56,7 @@ class CellFilm:
         self._steps += 1
 
 
-def picture_of(cell: Cell, size: tuple[int, int]) -> Picture:
+def picture_of(cell: Cell, size: tuple[int, int]) -> Pixels:
     """uint8 (height, width, 3): the cell as it is now, from `CAMERA`, without a window."""
     from PIL import Image
 
@@ -75,9 +64,7 @@ def picture_of(cell: Cell, size: tuple[int, int]) -> Picture:
     view, projection, _ = aimed(ROOM, CAMERA, size)
     matrices = view.T.ravel().tolist(), projection.T.ravel().tolist()
     light = (10 * LIGHT).tolist()
-    colour, _, owners = drawn(
-        cell.client, large, *matrices, light=light, distance=3, shades=(0.6, 0.42, 0.0), shadow=0
-    )
+    colour, _, owners = drawn(cell.client, large, *matrices, light=light, distance=3, shades=(0.6, 0.42, 0.0), shadow=0)
     colour = colour.copy()
     colour[np.array(owners).reshape(large[1], large[0]) < 0] = 255
     return np.asarray(Image.fromarray(colour).reduce(_OVERSAMPLING))
