@@ -217,7 +217,7 @@ def test_a_puzzle_of_ones_own(tmp_path, capsys):
         ("{", "Expected JSON"),
         ("[1, 2]", "something else"),
         ('{"a": 3}', "something else"),
-        ('{"a": [[0, 0, 0]], "b": [[0, 0, 0]]}', "overlap"),
+        ('{"a": [[0, 0, 0]], "b": [[0, 0, 0]]}', "same solid"),
         ('{"a": [[0, 0, 0]], "b": [[0, 0, 2]]}', "floating"),
         ('{"a": [[0, 0]]}', "three integers"),
     ],

@@ -165,7 +165,7 @@ def test_a_study_on_ray_loses_a_node_and_gives_the_whole_table(cluster, tmp_path
                 time.sleep(60)  # until the node is lost
         return {"variant": "colours", "count": n}
 
-    given = replace(study("tower"), methods=("bc",), sizes=(6,), pictures=("easy",), seeds=6, baselines=())
+    given = replace(study("tower"), methods=("bc",), sizes=(6,), pictures=("easy",), seeds=6, baselines=(), controls={})
     given = replace(given, options=training, test=lambda n: {"variant": "colours", "count": 5})
     wanted = reproduce_study(given, tmp_path / "here", epochs=1)
     done = []

@@ -119,7 +119,7 @@ def test_reproduced_studies(name, tmp_path, capsys):
     example = load(f"reproduce_{name}")
     given = replace(example.study(name), figures=(), **STUDIES[name])
     found = example.main(given, out=str(tmp_path), epochs=1)
-    assert set(found.records["method"]) == {*given.methods, *given.baselines}
+    assert set(found.records["method"]) == {*given.rows, *given.controls}
     assert "report.md" in capsys.readouterr().out
     assert (tmp_path / "report.md").exists()
     assert (tmp_path / "results.csv").exists()

@@ -291,7 +291,7 @@ def test_friction_beyond_what_numbers_can_tell_apart_is_answered():
         (lambda: ns.Assembly.from_cells({"a": [(0, 0, 0)]}, friction=-0.1), "friction of 0 or more"),
         (lambda: ns.Assembly.from_cells({"a": []}), "empty"),
         (lambda: ns.Assembly.from_cells({"a": [(0, 0, 0), (0, 0, 0)]}), "twice"),
-        (lambda: ns.Assembly.from_cells({"a": [(0, 0, 0)], "b": [(0, 0, 0)]}), "overlap"),
+        (lambda: ns.Assembly.from_cells({"a": [(0, 0, 0)], "b": [(0, 0, 0)]}), "same solid"),
         (lambda: ns.Assembly.from_cells({"a": [(0, 0)]}), "three integers"),
         (lambda: ns.Assembly.from_cells({"a": [(0, 0, 0.5)]}), "three integers"),
         (lambda: ns.Assembly.from_cells({"a": ["abc"]}), "three integers"),

@@ -135,7 +135,7 @@ def test_an_experiment_killed_while_it_trains_and_while_it_plans_ends_as_if_it_h
     assert first.stat().st_mtime_ns == trained
     ended = keys(out / "runs-clean-0.jsonl")
     assert ended[: len(planned)] == planned
-    assert len(ended) == len(set(ended)) == 24
+    assert len(ended) == len(set(ended)) == 32
     assert table(out)[1] == table(tmp_path / "whole")[1]
 
 

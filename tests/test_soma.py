@@ -268,7 +268,7 @@ HOVERING = {
         ({}, "cubes", "at least one"),
         ([], "cubes", "pieces as"),
         ({"a": []}, "cubes", "empty"),
-        ({"a": [(0, 0, 0)], "b": [(0, 0, 0)]}, "cubes", "overlap"),
+        ({"a": [(0, 0, 0)], "b": [(0, 0, 0)]}, "cubes", "same solid"),
         ({"a": [(0, 0, 0), (0, 0, 0)]}, "cubes", "twice"),
         ({"a": [(0, 0, 0), (2, 0, 0)]}, "cubes", "hang together"),
         ({"a": [(0, 0, 0), (1, 1, 0)]}, "cubes", "hang together"),

@@ -58,8 +58,10 @@ def weights_of(prior: NetworkPrior, path: Path) -> bytes:
 
 @pytest.mark.parametrize("name", sorted(RECIPES))
 def test_every_recipe_learns_stripes(name: str) -> None:
-    learn, test = stripes(64, marginals="paper" not in name), stripes(32, seed=1)
-    prior = NetworkPrior(name).fit(learn, epochs=60)
+    ours = name in ("sinkhorn", "tcn")
+    learn, test = stripes(64, marginals=ours), stripes(32, seed=1)
+    # A cross-entropy over a softmax of a softmax learns slowly.
+    prior = NetworkPrior(name).fit(learn, epochs=120 if "published" in name else 60)
     right = [s.order() == tuple(o) for s, o in zip(prior.read(test.pictures), test.sequences)]
     assert np.mean(right) > 0.9
 

@@ -859,7 +859,6 @@ def test_forces_at_contacts_are_arrows_between_steps(exhibit):
     points = viewer.scene._arrows.points
     assert points.shape[1:] == (2, 3)
     assert (points[:, 1, 2] >= points[:, 0, 2] - 1e-6).all()  # on whichever part each lifts
-    viewer._moved(0.5)
     viewer.slider.value = 0.5
     assert viewer.scene._arrows is None
     viewer.slider.value = 1.0

@@ -33,7 +33,7 @@ def _later(function: F, kept: bool) -> F:
     @functools.wraps(function)
     def call(*given: Any) -> Any:
         if function not in _ready:
-            tell(f"compiling {function.__module__.rpartition('.')[2]} (once, kept on disk)")
+            tell(f"compiling {(function.__module__ or function.__name__).rpartition('.')[2]} (once, kept on disk)")
             for each, alone in _waiting.pop(file):
                 # In place of what waits: compiled functions look for one another there.
                 _ready[each] = each.__globals__[each.__name__] = _made(each, alone)

@@ -12,6 +12,7 @@ from scipy.sparse.csgraph import reverse_cuthill_mckee
 from neurosym.geometry.stability import spring_kernels as kernels
 from neurosym.geometry.stability.springs import Springs
 from neurosym.support.arrays import Array, Numbers, Truths
+from neurosym.support.deadline import check
 
 #: Newton's steps in a round while nothing falls: the bounds are about to change. What falls is followed to the end.
 _STEPS, _MOST_STEPS = 3, 200
@@ -165,6 +166,7 @@ class _System:
                 return u, d, forces, True
             if step == most:
                 break
+            check()
             kernels.fill(self.band, self.ground, d, *spring, *ends)
             factor, fault = dpbtrf(self.band.T, lower=1, overwrite_ab=1)
             if fault:
