@@ -67,7 +67,7 @@ class TwoSidedSearchPlanner(SearchPlanner):
     ) -> PlanResult:
         """See `TwoSidedPlanner`: from both sides the one that ends first decides.
 
-        A side's turn lasts until its work exceeds the other's. The work of an attempt is taken as the square of the
+        A side's turn lasts until its work exceeds the other's. The work of an attempt is taken as the cube of the
         number of actions that are not done in its state: for parts, of those that are there.
         """
         if side not in SIDES:
@@ -111,7 +111,7 @@ class _Side:
             result: PlanResult = end.value
             return result
         left = len(self.context.classes) - depth
-        self.work += (1 + depth if self.context.from_goal else left) ** 2
+        self.work += (1 + depth if self.context.from_goal else left) ** 3
         return None
 
 

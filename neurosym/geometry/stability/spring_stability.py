@@ -159,9 +159,14 @@ class SpringStability:
         movable = subset & ~held & ~self.fixed
         for group in self.groups(movable):
             around = self.next_to(group) & subset & ~movable
-            settled = None if self._group(group, around).stands else self.settled(group | around, around)
-            if settled is None or settled.stands:
+            answer = self._group(group, around)
+            if answer.stands:
                 continue
+            # Most that falls, falls though all others are immovable: these alone are let go.
+            near = self.next_to(answer.falling) & (group | around) & ~answer.falling
+            settled = self.settled(answer.falling | near, near)
+            if settled.stands:
+                settled = self.settled(group | around, around)
             return tuple(
                 replace(m, lost=self.supports[m.part] & ~subset or self.touching[m.part] & ~subset)
                 for m in movements(self.springs, settled)
