@@ -45,7 +45,7 @@ def bricks(length: int, height: int) -> ns.Assembly:
 
 def questions(assembly: ns.Assembly) -> list[int]:
     """Bitsets of parts, each what is left after one more removal from the last that stood."""
-    rng, stability = np.random.default_rng(0), AssemblyGeometry(assembly, tabulate=False).stability
+    rng, stability = np.random.default_rng(0), AssemblyGeometry(assembly, tabulate=False).limit
     height = np.array([assembly.body_bounds[assembly.owners == k, 1, 2].max() for k in range(len(assembly))])
     there, asked = (1 << len(assembly)) - 1, []
     while len(asked) < QUESTIONS and there & ~assembly.fixed_mask:
@@ -75,7 +75,7 @@ def agreement(subsets: int, seed: int = 1000) -> None:
         springs = by_springs_of(world)
         answers = {
             "springs": springs.standing(subset),
-            "limit analysis": AssemblyGeometry(world).stability.standing(subset),
+            "limit analysis": AssemblyGeometry(world).limit.standing(subset),
         }
         for name, answer in answers.items():
             wrong[name][answer.stands] += answer.stands != seen
@@ -105,8 +105,8 @@ def _word(stands: bool) -> str:
 def measure(name: str, assembly: ns.Assembly, program: bool = True) -> None:
     """The same questions to springs, limit analysis and linear programs."""
     asked = questions(assembly)
-    springs, quick = by_springs_of(assembly), AssemblyGeometry(assembly).stability
-    slow = AssemblyGeometry(assembly, tabulate=False).stability
+    springs, quick = by_springs_of(assembly), AssemblyGeometry(assembly).limit
+    slow = AssemblyGeometry(assembly, tabulate=False).limit
     springs.standing((1 << len(assembly)) - 1)
     start = time.process_time()
     by_springs = [springs.standing(subset).stands for subset in asked]
