@@ -71,13 +71,15 @@ def run_trial(trial: Trial, given: Study, epochs: int | None = None) -> dict[str
     learner: Any = None if trial.method in BASELINES else load_prior(name)
     common: dict[str, Any] = {"split": trial.seed, "style": trial.pictures, "seed": trial.seed}
     recipe = "paper" if learner is None else getattr(learner, "labels", "full")
-    train = family.demonstrations("train", recipe=recipe, **common, **given.options(trial.n))
-    test = family.demonstrations(given.part, recipe="paper", **common, **given.test(trial.n))
+    configuration = _configuration(given, trial, epochs)
+    *_, to_learn, to_test = configuration["data"]
+    train = family.demonstrations("train", recipe=recipe, **common, **to_learn)
+    test = family.demonstrations(given.part, recipe="paper", **common, **to_test)
     seen = seen_in(train, test)
     if learner is None:
         return {"figures": averages(BASELINES[trial.method](train, test), seen), "counts": None}
     # What reads the same network in another way (with an assignment, without) has it from the shelf.
-    shared = {"trained_as": getattr(learner, "trained_as", name), **_configuration(given, trial, epochs)}
+    shared = {"trained_as": getattr(learner, "trained_as", name), **configuration}
     kept = Path(_shelf().name) / f"{key_of({**shared, 'recipe': None, 'method': None})}.safetensors"
     if kept.exists():
         learner = load_prior(name, weights=kept)
