@@ -271,7 +271,8 @@ def progress_bar(what: str, after: float = 0.0) -> Iterator[Progress]:
     start.start()
 
     def heard(doing: str, done: int, total: int) -> None:
-        bars.update(task, completed=done, total=total or None, description=f"{what}: {doing}" if doing else what)
+        bars.tasks[0].total = total or None  # an update to None would leave it
+        bars.update(task, completed=done, description=f"{what}: {doing}" if doing else what)
 
     try:
         with heard_by(heard):

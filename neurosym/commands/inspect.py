@@ -8,7 +8,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from neurosym.commands.common import AsJson, AssemblyPath, FileOptions, RemovalOptions, print_json, problem_at
+from neurosym.commands.common import (
+    AsJson,
+    AssemblyPath,
+    FileOptions,
+    RemovalOptions,
+    print_json,
+    problem_at,
+    progress_bar,
+)
 from neurosym.errors import InputError
 from neurosym.support.words import joined
 
@@ -38,8 +46,9 @@ def inspect(
     from neurosym.planning.inspection import inspect_problem
 
     problem = problem_at(path, files, replace(removal, paths=None).given())
-    inspection = inspect_problem(problem, margin=margin)
-    level = _level(problem) if removal.paths == "any" else None
+    with progress_bar(f"looking at {problem.name}", after=1.0):
+        inspection = inspect_problem(problem, margin=margin)
+        level = _level(problem) if removal.paths == "any" else None
     if as_json:
         answer = {"path": str(path), "units": problem.world.units, **inspection.as_json()}
         print_json(answer if removal.paths != "any" else {**answer, "level": level})
@@ -66,7 +75,8 @@ def count(
     from neurosym.planning.result import Status
 
     problem = problem_at(path, files, removal.given())
-    counted = count_orders(problem, budget=Budget(seconds=seconds, expansions=expansions))
+    with progress_bar(f"counting orders of {problem.name}", after=1.0):
+        counted = count_orders(problem, budget=Budget(seconds=seconds, expansions=expansions))
     if as_json:
         print_json({"path": str(path), **counted.as_json()})
     elif counted.orders is None:
@@ -108,12 +118,14 @@ def export(
 
         geometry = problem.geometry
         assert geometry is not None
-        write_graph(assembly_graph(geometry.blocking(problem.details["directions"]), geometry.contacts), graph)
+        with progress_bar(f"looking at {problem.name}", after=1.0):
+            write_graph(assembly_graph(geometry.blocking(problem.details["directions"]), geometry.contacts), graph)
         written.append(graph)
     if pddl is not None:
         from neurosym.pddl.export import as_pddl
 
-        task = as_pddl(problem, seconds=seconds)
+        with progress_bar(f"looking for what falls in {problem.name}", after=1.0):
+            task = as_pddl(problem, seconds=seconds)
         written += task.write(pddl)
         facts = {"sound": task.sound, "notes": list(task.notes), "actions": dict(task.actions)}
     if as_json:

@@ -26,6 +26,7 @@ from neurosym.geometry.stability.springs import DEFAULT_NUMBERS, DOWN, SpringNum
 from neurosym.geometry.stability.standing import Stability
 from neurosym.support.arrays import Array, Truths
 from neurosym.support.bitsets import bits
+from neurosym.support.progress import tell
 
 
 class SpringStability:
@@ -234,6 +235,7 @@ class SpringStability:
             self.asked["pushes"] += 1
             return SpringStanding(True)
         self.asked["springs"] += 1
+        tell("what stands", self.asked["springs"])
         settled = self.settled(there, around)
         if settled.stands:
             return SpringStanding(True)
