@@ -123,8 +123,8 @@ class GroupSemantics(Semantics):
             return Validation(False, 0, first.because, f"Step 0, {order[0]}: {first.reason}")
         for step, name in enumerate(order):
             if name in anchors:
-                said = "is an anchor" if name not in order[:step] else f"was done already, as step {order.index(name)}"
-                return Validation(False, step, (name,), f"{name} {said}.")
+                done = f"was done already, as step {order.index(name)}" if name in order[:step] else "is an anchor"
+                return Validation(False, step, (name,), f"{name} {done}.")
             missing = [a for a, b in problem.before if b == name and a not in order[:step]]
             if missing:
                 return Validation(False, step, (missing[0],), f"{name} may be done only after {missing[0]}.")
@@ -148,8 +148,8 @@ class GroupSemantics(Semantics):
             together = [b for b in together if b & set(self.setting.targets)]
         if together and (self.setting.targets or not need_not_part(together, self.assembly.piece_groups)):
             left = tuple(n for n in world.names if n in together[0])
-            said = f"After all {len(order)} actions the goal is missed: {listed(left)} are still together."
-            return Validation(False, len(order), left, said)
+            sentence = f"After all {len(order)} actions the goal is missed: {listed(left)} are still together."
+            return Validation(False, len(order), left, sentence)
         return Validation(True)
 
     def stands_at_first(self, world: AssemblyGeometry) -> Verdict:
@@ -158,8 +158,8 @@ class GroupSemantics(Semantics):
             return Verdict(True)
         answer = world.stability.standing_when_held((1 << len(world)) - 1, self.setting.held)
         falling = world.in_mask(answer.falling)
-        said = f"The assembly does not stand as it is: {listed(falling)} would fall."
-        return Verdict(answer.stands, () if answer.stands else falling, "" if answer.stands else said)
+        sentence = f"The assembly does not stand as it is: {listed(falling)} would fall."
+        return Verdict(answer.stands, () if answer.stands else falling, "" if answer.stands else sentence)
 
     def refute(self, problem: Problem) -> WhyNot | None:
         """A proof that some block never comes apart, even without gravity, where any order of splits will do."""

@@ -104,8 +104,8 @@ def _way(cells: GridCells, found: Separation | Stuck) -> StepMotion | NoWay:
     if isinstance(found, Separation):
         return separation_path(cells, found)
     names = tuple(cells.names[p] for p in bits(found.block))
-    said = f"No moves of groups separate what is wanted of {listed(names)}, in {found.explored:,} states."
-    return NoWay(said, names, found.proved)
+    sentence = f"No moves of groups separate what is wanted of {listed(names)}, in {found.explored:,} states."
+    return NoWay(sentence, names, found.proved)
 
 
 def check_motion(
@@ -116,20 +116,20 @@ def check_motion(
     Args:
         standing: whether all that stands on the ground; otherwise it is in the hand.
     """
-    assembly, said = geometry.assembly, ", ".join(motion.parts)
+    assembly, sentence = geometry.assembly, ", ".join(motion.parts)
     if motion.direction is None:
         if setting.paths == "straight" or not motion.tracks:
-            return Verdict(False, motion.parts, f"{said} cannot go {motion}: that is no straight line.")
+            return Verdict(False, motion.parts, f"{sentence} cannot go {motion}: that is no straight line.")
         clear = check_path(motion, assembly, among, ground=ground_of(assembly) if standing else None)
         return Verdict(clear.holds, clear.parts, clear.reason, motion=motion)
     direction, leaving = np.array(motion.direction), assembly.mask(motion.parts)
     if min(np.abs(direction - d).max() for d in geometry.blocking(setting.directions).vectors) > 1e-9:
-        return Verdict(False, motion.parts, f"{said} cannot go {motion}: that is none of the problem's directions.")
+        return Verdict(False, motion.parts, f"{sentence} cannot go {motion}: that is none of the problem's directions.")
     hit = 0
     for part in bits(leaving):
         hit |= geometry.hits_along(part, direction, among & ~leaving)
     into_table = standing and assembly.has_table and direction[2] < -assembly.tolerances.parallel
     names = (*assembly.in_mask(hit), *([GROUND] if into_table else []))
     if names:
-        return Verdict(False, assembly.in_mask(hit), f"{said} cannot go {motion}: {listed(names)} would be hit.")
+        return Verdict(False, assembly.in_mask(hit), f"{sentence} cannot go {motion}: {listed(names)} would be hit.")
     return Verdict(True, motion=motion)

@@ -153,8 +153,8 @@ def stands_at_first(setting: Setting) -> Derived:
         if answer.stands:
             return Verdict(True)
         falling = world.in_mask(answer.falling)
-        said = f"The assembly does not stand as it is: {listed(falling)} would fall."
-        return Verdict(False, falling, said, ())
+        sentence = f"The assembly does not stand as it is: {listed(falling)} would fall."
+        return Verdict(False, falling, sentence, ())
 
     def formula(world: AssemblyGeometry) -> formulas.AnyOf:
         if world.stability.standing_when_held((1 << len(world)) - 1, setting.held).stands:

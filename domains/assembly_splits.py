@@ -94,13 +94,13 @@ class Splitter:
         """Whether a half may leave by a given motion, asked of the pairs concerned alone."""
         leaving = self.assembly.mask(motion.parts)
         rest = block.parts & ~leaving
-        said = ", ".join(motion.parts)
+        sentence = ", ".join(motion.parts)
         apart = bool(leaving >> part & 1) != bool(leaving & anchor) and (anchor & rest) in (0, anchor)
         if leaving & ~block.parts or not apart:
             name = self.assembly.names[part]
-            return Verdict(False, motion.parts, f"{said}: this does not split {name} from its block.")
+            return Verdict(False, motion.parts, f"{sentence}: this does not split {name} from its block.")
         if block.stands and leaving & self.assembly.fixed_mask:
-            return Verdict(False, motion.parts, f"{said}: one of these is fixed.")
+            return Verdict(False, motion.parts, f"{sentence}: one of these is fixed.")
         free = check_motion(self.geometry, self.setting, motion, block.parts, standing=block.stands)
         if not free.holds:
             return free
@@ -111,7 +111,7 @@ class Splitter:
             answer = self.geometry.stability.standing(rest, held=held)
             if not answer.stands:
                 falling = self.assembly.in_mask(answer.falling)
-                return Verdict(False, falling, f"Without {said}, {listed(falling)} would fall.")
+                return Verdict(False, falling, f"Without {sentence}, {listed(falling)} would fall.")
             if self.setting.pull:
                 return checked_while_drawn(self.geometry, block.parts, motion)
         return Verdict(True, motion=motion)
@@ -147,16 +147,16 @@ class Splitter:
     def _interlocked(self, block: Block, part: int, anchor: int) -> Verdict:
         name, kept = self.assembly.names[part], self.assembly.in_mask(anchor)
         because = 0
-        said = []
+        sentence = []
         for d in range(len(self.graph.vectors)):
             if block.stands and self.graph.into_table[d]:
-                said.append(f"{self.graph.describe(d)}: into the table")
+                sentence.append(f"{self.graph.describe(d)}: into the table")
                 continue
             hit = self.graph.blockers(part, d, block.parts)
             because |= hit
             closed = self.assembly.in_mask(self.graph.carried(1 << part, d, block.parts))
-            said.append(f"{self.graph.describe(d)}: it moves {listed(closed)}")
-        reason = f"{name} cannot be separated from {listed(kept)} along any direction ({'; '.join(said)})."
+            sentence.append(f"{self.graph.describe(d)}: it moves {listed(closed)}")
+        reason = f"{name} cannot be separated from {listed(kept)} along any direction ({'; '.join(sentence)})."
         return Verdict(False, self.assembly.in_mask(because), reason)
 
     # -- paths ------------------------------------------------------------------------------------------------

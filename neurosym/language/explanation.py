@@ -87,41 +87,41 @@ class WhyNot:
             return self._of_building(self.building)
         start = f"After {listed(self.after)} nothing" if self.after else "Nothing"
         relaxed = ", even if nothing could fall and any order would do" if self.relaxed else ""
-        said = [f"{start} can be taken out of {listed(self.left)}{relaxed}."]
+        lines = [f"{start} can be taken out of {listed(self.left)}{relaxed}."]
         if self.cycle is not None:
             chain = " blocks ".join([self.cycle.parts[0], *self.cycle.parts[:0:-1], self.cycle.parts[0]])
-            said.append(
+            lines.append(
                 f"The smallest interlocked cycle, along {in_words(self.cycle.direction)}, has "
                 f"{len(self.cycle.parts)} parts: {chain}."
             )
         by_part: dict[str, list[Blocked]] = {}
         for blocked in self.blocked:
             by_part.setdefault(blocked.part, []).append(blocked)
-        said += _first(
+        lines += _first(
             [
                 f"{part} is blocked: " + "; ".join(f"{in_words(b.direction)} by {listed(b.by)}" for b in entries) + "."
                 for part, entries in by_part.items()
             ],
             "parts are blocked",
         )
-        said += _first([_fall(f) for f in self.falls], "parts could go, but others would fall")
-        said += _first([f"{a} may leave only after {b}." for a, b in self.waiting], "parts wait for others")
+        lines += _first([_fall(f) for f in self.falls], "parts could go, but others would fall")
+        lines += _first([f"{a} may leave only after {b}." for a, b in self.waiting], "parts wait for others")
         if self.unproved:
-            said.append(
+            lines.append(
                 f"For {listed(self.unproved)} the search for a way ended without one, which proves nothing: "
                 "more directions or a larger budget may find it."
             )
-        return tuple(said)
+        return tuple(lines)
 
     def _of_building(self, base: tuple[str, ...]) -> tuple[str, ...]:
         start, loose = f"From {listed(base) or 'the table'} alone", len(self.after) + len(self.left)
         placed = f": {listed(self.after[::-1])}" if self.after else ""
-        said = [f"{start} only {len(self.after)} of {loose} parts can be put in place one by one{placed}."]
+        lines = [f"{start} only {len(self.after)} of {loose} parts can be put in place one by one{placed}."]
         blocked = list(dict.fromkeys(b.part for b in self.blocked))
-        said += _first([f"{part} has no way in any more." for part in blocked], "parts have no way in")
-        said += _first([_fall(f, "With") for f in self.falls], "parts could come next, but something would fall")
-        said += _first([f"{b} may come only after {a}." for a, b in self.waiting], "parts wait for others")
-        return tuple(said)
+        lines += _first([f"{part} has no way in any more." for part in blocked], "parts have no way in")
+        lines += _first([_fall(f, "With") for f in self.falls], "parts could come next, but something would fall")
+        lines += _first([f"{b} may come only after {a}." for a, b in self.waiting], "parts wait for others")
+        return tuple(lines)
 
     def as_json(self) -> dict[str, Any]:
         """For a file: the attributes, and `sentences`."""

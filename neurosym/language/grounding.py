@@ -174,12 +174,12 @@ class GroundProblem:
         return Rejection(f"{self.actions[action]} is not applicable: it needs {', '.join(missing)}.")
 
     def _rejection(self, state: int, action: int, refused: Refused) -> Rejection:
-        verdict, said = refused.verdict, refused.sentence
+        verdict, phrase = refused.verdict, refused.sentence
         # A promise speaks of a verdict that stays false; it says nothing of one that must become false.
         if not verdict.proved:
-            return Rejection(said, verdict.because, proved=False)
+            return Rejection(phrase, verdict.because, proved=False)
         if not refused.positive or verdict.until is None:
-            return Rejection(said, verdict.because, ())
+            return Rejection(phrase, verdict.because, ())
         known = self._promises.get(verdict.until)
         if known is None:
             touching = {a for atom in verdict.until for a in self._touching.get(atom, ())}
@@ -188,7 +188,7 @@ class GroundProblem:
         until, atoms = known
         # Before any of `until` is done the atoms are as at first: only if they are so now does the verdict speak of it.
         unconditional = verdict.unconditional and not (state ^ self.initial) & atoms
-        return Rejection(said, verdict.because, until or (action,), unconditional)
+        return Rejection(phrase, verdict.because, until or (action,), unconditional)
 
     # -- construction -----------------------------------------------------------------------------------------
 

@@ -57,13 +57,13 @@ def free(present: Fluent, *, directions: ArrayLike | None = None, table: bool = 
             # One blocker a direction keeps the promise; one that blocks several keeps it for all of them.
             if not witnesses & hit:
                 witnesses |= hit & -hit
-        said = "; ".join(
+        sentence = "; ".join(
             f"{graph.describe(d)}: {', '.join(world.in_mask(hits[d])) if d in hits else 'the table'}"
             for d in range(len(graph.vectors))
         )
         until = tuple(Atom(present, (n,)) for n in world.in_mask(witnesses)) if removal else None
-        said = f"{p} is blocked in every direction ({said})."
-        return Verdict(False, world.in_mask(because), said, until, unconditional=True)
+        sentence = f"{p} is blocked in every direction ({sentence})."
+        return Verdict(False, world.in_mask(because), sentence, until, unconditional=True)
 
     def formula(world: AssemblyGeometry, p: str) -> formulas.AnyOf:
         graph = world.blocking(directions)
@@ -173,11 +173,11 @@ def stands(
         held: how many may be held.
         removal: parts that left do not come back, so that the parts that move are all that a promise rests on.
     """
-    said = ", ".join(leaving)
+    sentence = ", ".join(leaving)
     answer = world.stability.standing_when_held(rest, held) if held else world.stability.standing(rest)
     if answer.stands:
         motion = StepMotion(held=world.in_mask(answer.held)) if answer.held else None
-        return Verdict(True, (), f"The others stand without {said}.", motion=motion)
+        return Verdict(True, (), f"The others stand without {sentence}.", motion=motion)
     verdict = _falls(world, answer.falling, leaving, held)
     if present is None or not answer.promises:
         return verdict
@@ -194,12 +194,13 @@ def stands(
 def _falls(world: AssemblyGeometry, moving: int, leaving: Sequence[str], held: int) -> Verdict:
     falling = world.in_mask(moving)
     lost = losses(world, moving, world.mask(leaving))
-    said = f"Without {listed(leaving)}, {listed(falling)} would fall" if leaving else f"{listed(falling)} would fall"
+    without = f"Without {listed(leaving)}, " if leaving else ""
+    sentence = f"{without}{listed(falling)} would fall"
     if held:
-        said += f", whichever {'part' if held == 1 else f'{held} parts'} one holds"
+        sentence += f", whichever {'part' if held == 1 else f'{held} parts'} one holds"
     if lost:
-        said += f" ({listed([f'{a} loses {b}' for a, b in lost])})"
-    return Verdict(False, falling, f"{said}.")
+        sentence += f" ({listed([f'{a} loses {b}' for a, b in lost])})"
+    return Verdict(False, falling, f"{sentence}.")
 
 
 def losses(world: AssemblyGeometry, falling: int, leaving: int) -> tuple[tuple[str, str], ...]:

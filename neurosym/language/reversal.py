@@ -94,12 +94,12 @@ class ReversedProblem:
         return None
 
     def _rejection(self, before: int, action: int, refused: Refused) -> Rejection:
-        verdict, said = refused.verdict, refused.sentence
+        verdict, phrase = refused.verdict, refused.sentence
         atoms = verdict.decided_by
         if atoms is None and verdict.unconditional:
             atoms = verdict.until
         if not verdict.proved or not refused.positive or atoms is None:
-            return Rejection(said, verdict.because, proved=verdict.proved)
+            return Rejection(phrase, verdict.because, proved=verdict.proved)
         deciding = self._deciding.get(atoms)
         if deciding is None:
             touching = {a for atom in atoms for a in self.ground.touching(atom)}
@@ -109,4 +109,4 @@ class ReversedProblem:
         others = [a for a in deciding if a != action]
         until = tuple(a for a in others if self._changes[a] & done)
         given = tuple(a for a in others if not self._changes[a] & done)
-        return Rejection(said, verdict.because, until or (action,), unconditional=True, given=given)
+        return Rejection(phrase, verdict.because, until or (action,), unconditional=True, given=given)

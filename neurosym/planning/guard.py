@@ -55,7 +55,7 @@ def side_of(problem: Problem, planner: Planner, side: str | None, *, alone: bool
         "not every action is asked for by the goal, once, beside others that change something else": alone
         and reversed_problem(problem.ground()) is None,
     }
-    why = next((said for said, hinders in hindrances.items() if hinders), None)
+    why = next((sentence for sentence, hinders in hindrances.items() if hinders), None)
     if why is not None and side == "empty":
         raise InputError(f"Expected a search that can begin at the goal for side 'empty'; {why}. Take side 'full'.")
     return wanted if why is None else "full"

@@ -58,8 +58,8 @@ def validate(problem: Problem, order: Sequence[str], motions: Sequence[StepMotio
             # What the domain itself says of doing it again, a tower that comes down for instance, is worth hearing.
             action, binding = ground[name]
             again = failure([p.bind(binding) for p in action.pre])
-            said = f"{name} was done already, as step {done.index(name)}." + (f" {again[1]}" if again else "")
-            return Validation(False, step, (name,), said)
+            sentence = f"{name} was done already, as step {done.index(name)}." + (f" {again[1]}" if again else "")
+            return Validation(False, step, (name,), sentence)
         for first, then in problem.before:
             if then == name and first in possible and first not in done:
                 return Validation(False, step, (first,), f"{name} may be done only after {first}.")

@@ -34,12 +34,12 @@ def assembly_graph(blocking: BlockingGraph, contacts: Iterable[Contact]) -> nx.M
             raise InputError(f"Expected no part of the name {GROUND!r}, which stands for the ground. Rename it.")
         graph.add_node(GROUND, fixed=True, ground=True)
     for d, (x, y, z) in enumerate(blocking.vectors):
-        said = {"kind": "blocks", "direction": blocking.describe(d), "x": x, "y": y, "z": z}
+        sentence = {"kind": "blocks", "direction": blocking.describe(d), "x": x, "y": y, "z": z}
         for part, mask in enumerate(blocking.by_part[d]):
             for other in assembly.in_mask(mask):
-                graph.add_edge(assembly.names[part], other, **said)
+                graph.add_edge(assembly.names[part], other, **sentence)
             if blocking.into_table[d]:
-                graph.add_edge(assembly.names[part], GROUND, **said)
+                graph.add_edge(assembly.names[part], GROUND, **sentence)
     for (a, b), areas in areas_between(assembly, contacts).items():
         other = GROUND if b == TABLE else assembly.names[b]
         graph.add_edge(assembly.names[a], other, kind="touches", area=sum(areas))
@@ -64,13 +64,13 @@ def _json(graph: nx.MultiDiGraph) -> str:
 
 def _dot(graph: nx.MultiDiGraph) -> str:
     lines = ["digraph assembly {"]
-    for name, said in graph.nodes(data=True):
-        lines.append(f"  {_quoted(name)} [shape={'box' if said['fixed'] else 'ellipse'}];")
-    for a, b, said in graph.edges(data=True):
-        if said["kind"] == "blocks":
-            look = f"label={_quoted(said['direction'])}"
+    for name, facts in graph.nodes(data=True):
+        lines.append(f"  {_quoted(name)} [shape={'box' if facts['fixed'] else 'ellipse'}];")
+    for a, b, facts in graph.edges(data=True):
+        if facts["kind"] == "blocks":
+            look = f"label={_quoted(facts['direction'])}"
         else:
-            look = f'dir=none, style=dashed, label="{said["area"]:.4g}"'
+            look = f'dir=none, style=dashed, label="{facts["area"]:.4g}"'
         lines.append(f"  {_quoted(a)} -> {_quoted(b)} [{look}];")
     return "\n".join([*lines, "}"]) + "\n"
 

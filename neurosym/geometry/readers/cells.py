@@ -33,8 +33,8 @@ def parts_from_cells(cells: Mapping[str, Iterable[Sequence[int]]], size: float) 
             if cell in owner:
                 other = owner[cell]
                 if other != name and {c for c, own in owner.items() if own == other} == set(triples):
-                    said = f"Parts {other!r} and {name!r} are the same solid in the same place. Take one of them away."
-                    raise AssemblyError(said)
+                    same = f"Parts {other!r} and {name!r} are the same solid in the same place."
+                    raise AssemblyError(f"{same} Take one of them away.")
                 fault = "comes twice" if other == name else f"belongs to {other!r} too: the parts overlap"
                 raise AssemblyError(f"Part {name!r}: the cell {cell} {fault}. Give each cell to one part, once.")
             owner[cell] = name
