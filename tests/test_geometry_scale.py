@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
@@ -92,19 +92,26 @@ def test_answers_are_those_of_the_linear_program(local, cells, data):
 
 @settings(max_examples=15, deadline=None)
 @given(stacks, st.integers(0, 2))
+@example(
+    cells={
+        "p0": [(3, 0, 0)], "p1": [(4, 0, 0)], "p2": [(0, 0, 0)], "p3": [(3, 0, 1), (4, 0, 1)], "p4": [(3, 0, 2)],
+        "p5": [(3, 0, 3), (4, 0, 3), (5, 0, 3)], "p6": [(3, 0, 4)],
+    },
+    most=1,
+)  # fmt: skip
 def test_hands_are_found_exactly_where_some_set_helps(cells, most):
-    stability = AssemblyGeometry(ns.Assembly.from_cells(cells)).stability
-    everything = (1 << len(cells)) - 1
-    subset = everything & ~1
-    answer = stability.standing_when_held(subset, most)
+    geometry = AssemblyGeometry(ns.Assembly.from_cells(cells))
+    subset = (1 << len(cells)) - 1 & ~1
     sets = [sum(c) for k in range(most + 1) for c in itertools.combinations([1 << i for i in bits(subset)], k)]
-    assert answer.stands is any(stability.standing(subset, held).stands for held in sets)
-    if answer.stands:
-        assert answer.held.bit_count() <= most
-        assert stability.standing(subset, answer.held).stands
-    else:
-        # Nothing less stands either, while all that moved one way or another are there.
-        assert not stability.standing_when_held(answer.moving, most).stands
+    for stability in (geometry.limit, geometry.springs):
+        answer = stability.standing_when_held(subset, most)
+        assert answer.stands is any(stability.standing(subset, held).stands for held in sets)
+        if answer.stands:
+            assert answer.held.bit_count() <= most
+            assert stability.standing(subset, answer.held).stands
+        elif answer.promises:
+            # Nothing less stands either, while all that moved one way or another are there.
+            assert not stability.standing_when_held(answer.moving, most).stands
 
 
 @pytest.mark.parametrize("friction", [0.5, 0.8])

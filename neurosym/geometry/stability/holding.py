@@ -48,23 +48,27 @@ def parts_to_hold(standing: Callable[[int], Standing], hands: int, most: int) ->
         A bitset of parts, None if nothing helps; and the motions that were met, each a bitset of the parts that move.
     """
     motions: list[int] = []
+    lasting: list[int] = []  # those that stay possible whatever else is held
+    asked: set[int] = set()
 
-    def search(held: int, left: int, barred: int) -> int | None:
-        while True:
-            missed = [m & hands & ~barred for m in motions if not m & held]
-            if not missed:
-                answer = standing(held)
-                if answer.stands:
-                    return held
-                motions.append(answer.moving)
-                continue
-            if not left:
-                return None
-            for part in bits(min(missed, key=int.bit_count)):
-                found = search(held | 1 << part, left - 1, barred)
-                if found is not None:
-                    return found
-                barred |= 1 << part
+    def search(held: int, left: int) -> int | None:
+        if held in asked:
             return None
+        asked.add(held)
+        missed = [m & hands for m in lasting if not m & held]
+        options = min(missed, key=int.bit_count, default=None)
+        if options is None:
+            answer = standing(held)
+            if answer.stands:
+                return held
+            motions.append(answer.moving)
+            if answer.promises:
+                lasting.append(answer.moving)
+            options = answer.moving & hands & ~held
+        for part in bits(options) if left else ():
+            found = search(held | 1 << part, left - 1)
+            if found is not None:
+                return found
+        return None
 
-    return search(0, most, 0), motions
+    return search(0, most), motions
