@@ -107,9 +107,9 @@ def write(folder: Path) -> dict[str, Path]:
 def main(folder: Path) -> None:
     for units, path in write(folder).items():
         assembly = ns.Assembly.load(path, units=units or None)
-        # Balls with play lie on nothing that is flat: under gravity, a cage that is not drawn keeps them.
-        balls = [name for name in assembly.names if name.startswith("ball")]
-        for gravity, fixed in ((False, ["base"]), (True, ["base", *balls]), (True, ["base"])):
+        # A cage that is not drawn keeps the balls, which lie on nothing flat; what presses pins in is no preload here.
+        kept = [name for name in assembly.names if name.startswith(("ball", "pin"))]
+        for gravity, fixed in ((False, ["base"]), (True, ["base", *kept]), (True, ["base"])):
             problem = ns.load_domain("assembly").problem(assembly, gravity=gravity, fixed=fixed)
             result = ns.solve(problem, prior="outermost-first", budget=ns.Budget(seconds=10))
             print(f"{path.name:10} {len(fixed)} fixed, {'with' if gravity else 'no'} gravity:", end=" ")
