@@ -16,13 +16,13 @@ from scipy.optimize import linear_sum_assignment
 
 from neurosym.errors import InputError
 from neurosym.support.arrays import Array
-from neurosym.support.deadline import portions
+from neurosym.support.deadline import check, portions
 
 #: Least log-probability a score may have (nats). A prior that is sure still leaves every order a finite cost.
 LOG_FLOOR = -30.0
 
-#: Scores that are normalised at a time: what bounds memory.
-_AT_A_TIME = 1_000_000
+#: Scores that are made at a time: what bounds memory, and for how long nobody looks at the clock.
+AT_A_TIME = 1_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +46,7 @@ class OrderScores:
         table = np.array(self.log_prob, dtype=np.float64)
         if table.ndim != 2:
             raise InputError(f"Expected log_prob of shape (n_steps, n_actions); got shape {table.shape}.")
+        check()
         if np.isnan(table).any() or np.isposinf(table).any():
             raise InputError("Expected log_prob without NaN and +inf; got some. Check the network that made it.")
         n_steps, n_actions = table.shape
@@ -163,7 +164,7 @@ class OrderScores:
 
 def _normalised(table: Array) -> Array:
     """Rows that sum to one in exp(), none below the floor (rows of nothing but -inf become uniform), in their place."""
-    for some in portions(np.full(len(table) if table.size else 0, table.shape[1]), _AT_A_TIME):
+    for some in portions(np.full(len(table) if table.size else 0, table.shape[1]), AT_A_TIME):
         rows = table[some]
         top = rows.max(axis=1, keepdims=True)
         shifted = np.where(np.isfinite(top), rows - np.where(np.isfinite(top), top, 0.0), 0.0)

@@ -9,9 +9,10 @@ from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.blocking.directions import Directions
 from neurosym.geometry.queries import AssemblyGeometry
 from neurosym.language.problem import Problem
-from neurosym.planning.order_scores import OrderScores
+from neurosym.planning.order_scores import AT_A_TIME, OrderScores
 from neurosym.planning.prior import Prior
 from neurosym.support.bitsets import bits
+from neurosym.support.deadline import portions
 
 
 class OutermostFirst(Prior):
@@ -51,9 +52,9 @@ class OutermostFirst(Prior):
         rank = {name: place for place, name in enumerate(order)}
         place = np.argsort(np.argsort([rank[n] for n in parts]))
         steps = np.arange(len(parts))
-        table = np.subtract.outer(steps, place).astype(np.float64)
-        np.abs(table, out=table)
-        table /= -self.decay
+        table = np.empty((len(parts), len(parts)))
+        for rows in portions(np.full(len(parts), len(parts)), AT_A_TIME):
+            table[rows] = np.abs(np.subtract.outer(steps[rows], place)) / -self.decay
         return OrderScores(table, problem.actions, classes=problem.classes)
 
 
