@@ -24,6 +24,7 @@ from neurosym.geometry.rigid_motions import Interpolation, posed, shifted
 from neurosym.geometry.step_motion import Kind, StepMotion
 from neurosym.support.arrays import Array
 from neurosym.support.deadline import check
+from neurosym.support.progress import tell
 
 #: What `extract` tries, in this order.
 KINDS: tuple[Kind, ...] = ("lattice", "translation", "rigid")
@@ -95,6 +96,7 @@ def extract(
     proved, checks = False, 0
     reasons = []
     for kind in kinds:
+        tell(f"a path, {kind}")
         removal = Removal(assembly, moving, among, ground, max_checks, seconds)
         try:
             if kind == "lattice":

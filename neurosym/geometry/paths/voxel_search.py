@@ -26,6 +26,7 @@ from neurosym.geometry.paths.voxel_groups import ENDLESS, closures, undriving, u
 from neurosym.geometry.paths.voxel_separation import DIRECTIONS, Move, Offset, Separation, Stuck
 from neurosym.support.bitsets import bits
 from neurosym.support.deadline import check
+from neurosym.support.progress import tell
 
 #: Up to so many parts, pairs and closures are looked at one by one, which is quicker than arrays are.
 FEW = 24
@@ -100,6 +101,7 @@ class _Search:
             best: tuple[int, int, State, int, int] | None = None
             for number, state in enumerate(layer):
                 check()
+                tell("moves of groups", number, len(layer))
                 if deadline is not None and number % 64 == 0 and time.monotonic() > deadline:
                     return Stuck(False, len(came), self.among)
                 met.append(self.gaps.meetings(state))
