@@ -73,4 +73,6 @@ def standing_while_pulled(
         return SpringStanding(True, 0, held)
     alone = stability.settled(there, around, slippery=leaving).stands
     settled = stability.settled(there, around if alone else around | leaving, loads=loads, slippery=leaving)
-    return SpringStanding(settled.stands, 0 if settled.stands else moving_parts(settled) & ~leaving, held)
+    # Whether what is drawn moves by itself is no matter: it is on its way.
+    moving = 0 if settled.stands else moving_parts(settled) & ~leaving
+    return SpringStanding(not moving, moving, held)
