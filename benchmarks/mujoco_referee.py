@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import neurosym as ns
-from neurosym.geometry.assembly import Box
+from neurosym.geometry.shapes import Box
 
 #: Steps a second, and steps that are waited.
 RATE, STEPS = 1000, 1000

@@ -1,6 +1,9 @@
 """Does a replay in PyBullet say what `validate` says? Soma plans and random orders; each difference with its reason.
 
     python benchmarks/replay_agreement.py [ORDERS] [--pull N] [--out docs/replay.md]
+
+Each difference is put to PyBullet once more, afresh: does what is left stand, from where it was assembled? And to
+MuJoCo (extra `mujoco`).
 """
 
 from __future__ import annotations
@@ -13,14 +16,18 @@ from collections import Counter
 from dataclasses import dataclass, replace
 
 import numpy as np
+from mujoco_referee import settled
 
 import neurosym as ns
 from neurosym.geometry.queries import AssemblyGeometry
 from neurosym.simulation import ReplayReport, replay_plan
+from neurosym.simulation.world import stands as rests
 from neurosym.support.files import write_text
 
 #: Tilted by so many degrees: what then falls was about to.
 NEARLY = 3.0
+#: Of a cube: a part that goes farther has moved.
+MOVED = 0.2
 #: Of a cube: a part that goes farther than this in a second, and not as far as counts as moved, has begun to tilt.
 TILTS = 0.005
 
@@ -40,8 +47,10 @@ class Comparison:
     planned: bool
     geometry: int | None
     physics: int | None
-    said: str
+    account: str
     reason: str = ""
+    #: What is left at the first step where they differ: does it stand, by geometry, by Bullet afresh, by MuJoCo?
+    verdicts: tuple[bool, bool, bool] = (True, True, True)
 
     @property
     def agrees(self) -> bool:
@@ -60,19 +69,35 @@ def compare(seed: int, planned: bool) -> Comparison:
     report = replay_plan(problem, order, motions, stop_at_failure=True)
     checked = ns.validate(problem, order)
     step = report.failed_at
-    said = checked.reason if step is None else report.steps[step].reason
-    found = Comparison(number, "".join(order), planned, checked.failed_at, step, said)
+    account = checked.reason if step is None else report.steps[step].reason
+    comparison = Comparison(number, "".join(order), planned, checked.failed_at, step, account)
     if checked.failed_at == step:
-        return found
-    return replace(found, reason=reason(problem, order, checked, report))
-
-
-def reason(problem: ns.Problem, order: tuple[str, ...], checked: ns.Validation, report: ReplayReport) -> str:
-    """Why the two differ, at the first step where they do."""
+        return comparison
     step = min(s for s in (checked.failed_at, report.failed_at) if s is not None)
-    world = problem.world
-    left = world.mask(world.names) & ~world.mask(order[: step + 1])
+    left = problem.world.mask(problem.world.names) & ~problem.world.mask(order[: step + 1])
+    verdicts = referees(problem.world, left)
+    return replace(comparison, reason=reason(problem.world, left, step, checked, report, verdicts), verdicts=verdicts)
+
+
+def referees(world: ns.Assembly, left: int) -> tuple[bool, bool, bool]:
+    """Whether what is left stands where it was assembled: by geometry, by Bullet, by MuJoCo."""
+    names = world.in_mask(left)
+    if not names:
+        return True, True, True
+    return stands(world, left), not rests(world, present=names), max(settled(world, names).values()) < MOVED
+
+
+def reason(
+    world: ns.Assembly,
+    left: int,
+    step: int,
+    checked: ns.Validation,
+    report: ReplayReport,
+    verdicts: tuple[bool, bool, bool],
+) -> str:
+    """Why the two differ, at the first step where they do."""
     seen = report.steps[step]
+    _, afresh, mujoco = verdicts
     if step != report.failed_at:
         if "blocked" in checked.reason:
             return "geometry: blocked in every direction; the replay found a way past what had shifted"
@@ -85,14 +110,22 @@ def reason(problem: ns.Problem, order: tuple[str, ...], checked: ns.Validation, 
         shifted = max((s.displacement for s in report.steps[:step]), default=0.0)
         if shifted > TILTS:
             return f"what earlier steps had shifted, by {shifted:.2f}, less than counts as moved, holds it"
-        return "geometry: falls; Bullet holds it"
+        if not afresh:
+            return "falls in Bullet, too, asked afresh: what earlier steps had shifted holds it"
+        if not mujoco:
+            return "falls, in MuJoCo, too; Bullet alone holds it"
+        return "falls; both simulators hold it"
     if seen.in_the_way:
         return "what earlier steps had shifted, by less than counts as moved, is in the way"
     if not stands(world, left, friction=world.friction / DIAGONAL):
         return "stands by friction near its limit: Bullet lets it slip"
     if not stands(world, left, tilt=NEARLY):
         return f"stands, but falls if it is tilted by {NEARLY:g} degrees"
-    return "not explained"
+    if afresh:
+        return "stands in Bullet, too, asked afresh: what earlier steps had shifted makes it fall"
+    if mujoco:
+        return "stands, in MuJoCo, too; Bullet alone lets it fall"
+    return "stands; both simulators let it fall"
 
 
 def stands(world: ns.Assembly, parts: int, friction: float | None = None, tilt: float = 0.0) -> bool:
@@ -101,11 +134,11 @@ def stands(world: ns.Assembly, parts: int, friction: float | None = None, tilt: 
     return bool(AssemblyGeometry(changed, tabulate=False, tilt=tilt).stability.standing(parts).stands)
 
 
-def pulled_plans(found: list[Comparison], count: int) -> list[tuple[bool, bool | None]]:
+def pulled_plans(compared: list[Comparison], count: int) -> list[tuple[bool, bool | None]]:
     """Whether the rest stands still while the pieces of a plan are pulled out; and of a plan that was made with that
     in mind (`pull=True`), None where there is none."""
     family, pairs = ns.load_domain("assembly"), []
-    for c in [c for c in found if c.planned][:count]:
+    for c in [c for c in compared if c.planned][:count]:
         problem = ns.load_domain("soma").problem(c.number, collapse="rigid")
         own = family.problem(problem.world, pull=True)
         planned = ns.solve(own, rng=0).plan
@@ -117,10 +150,10 @@ def survives(problem: ns.Problem, order: list[str]) -> bool:
     return replay_plan(problem, order, pulled=True, stop_at_failure=True).ok
 
 
-def table(found: list[Comparison]) -> list[str]:
+def table(compared: list[Comparison]) -> list[str]:
     lines = ["| orders | n | same verdict | same first failing step |", "|---|---|---|---|"]
-    groups = [("planned, accepted by `validate`", [c for c in found if c.planned])]
-    groups += [("random", [c for c in found if not c.planned]), ("all", found)]
+    groups = [("planned, accepted by `validate`", [c for c in compared if c.planned])]
+    groups += [("random", [c for c in compared if not c.planned]), ("all", compared)]
     for name, group in groups:
         verdict, step = sum(c.agrees for c in group), sum(c.geometry == c.physics for c in group)
         n = len(group)
@@ -128,12 +161,29 @@ def table(found: list[Comparison]) -> list[str]:
     return lines
 
 
+def second_opinions(apart: list[Comparison]) -> list[str]:
+    """What the two simulators say, asked afresh, of what is left at the step where replay and geometry differ."""
+    bullet, mujoco = (sum(c.verdicts[0] == c.verdicts[k] for c in apart) for k in (1, 2))
+    split = sum(c.verdicts[1] != c.verdicts[2] for c in apart)
+    alone = [f"cube {c.number}, {c.order}" for c in apart if c.verdicts[1] == c.verdicts[2] != c.verdicts[0]]
+    return [
+        "What is left at that step was then put, where it was assembled, to Bullet afresh and to MuJoCo (round "
+        f"friction cones, no slip). Of these {len(apart)}, Bullet says what geometry says in {bullet}, MuJoCo in "
+        f"{mujoco}; the two simulators differ in {split}. Both against geometry: {'; '.join(alone) or 'none'}.",
+        "",
+    ]
+
+
+def word(rests: bool) -> str:
+    return "stands" if rests else "falls"
+
+
 def steps_of(failed: int | None) -> str:
     return "all" if failed is None else f"stops at {failed + 1}"
 
 
-def text(found: list[Comparison], pulled: list[tuple[bool, bool | None]], seconds: float, command: str) -> str:
-    apart = [c for c in found if c.geometry != c.physics]
+def text(compared: list[Comparison], pulled: list[tuple[bool, bool | None]], seconds: float, command: str) -> str:
+    apart = [c for c in compared if c.geometry != c.physics]
     reasons = Counter(c.reason.split(", by")[0] for c in apart)
     lines = [
         "# Replays against `validate`",
@@ -144,7 +194,7 @@ def text(found: list[Comparison], pulled: list[tuple[bool, bool | None]], second
         "plans (backtracking without a prior, ties at random), half are random permutations, most of which fail "
         "somewhere. A part has moved when a corner of it went by more than 0.2 of a cube.",
         "",
-        *table(found),
+        *table(compared),
         "",
         "## Why they differ",
         "",
@@ -152,6 +202,7 @@ def text(found: list[Comparison], pulled: list[tuple[bool, bool | None]], second
         "|---|---|",
         *(f"| {why} | {n} |" for why, n in reasons.most_common()),
         "",
+        *second_opinions(apart),
     ]
     if pulled:
         still, made = sum(ok for ok, _ in pulled), [ok for _, ok in pulled if ok is not None]
@@ -167,11 +218,12 @@ def text(found: list[Comparison], pulled: list[tuple[bool, bool | None]], second
     lines += [
         "## All differences",
         "",
-        "| cube | order | planned | geometry | replay | what the replay saw, or else geometry | why |",
-        "|---|---|---|---|---|---|---|",
+        "| cube | order | planned | geometry | replay | Bullet afresh | MuJoCo | what the replay saw, or else geometry "
+        "| why |",
+        "|---|---|---|---|---|---|---|---|---|",
         *(
             f"| {c.number} | {c.order} | {'yes' if c.planned else 'no'} | {steps_of(c.geometry)} | "
-            f"{steps_of(c.physics)} | {c.said} | {c.reason} |"
+            f"{steps_of(c.physics)} | {word(c.verdicts[1])} | {word(c.verdicts[2])} | {c.account} | {c.reason} |"
             for c in apart
         ),
         "",
@@ -195,13 +247,13 @@ def main() -> None:
     parser.add_argument("--out", help="keep it as Markdown")
     options = parser.parse_args()
     start = time.perf_counter()
-    found = [compare(seed, planned) for seed in range((options.orders + 1) // 2) for planned in (True, False)]
-    pulled = pulled_plans(found, options.pull)
+    compared = [compare(seed, planned) for seed in range((options.orders + 1) // 2) for planned in (True, False)]
+    pulled = pulled_plans(compared, options.pull)
     command = " ".join(["python benchmarks/replay_agreement.py", *sys.argv[1:]])
-    said = text(found, pulled, time.perf_counter() - start, command)
-    print(said)
+    report = text(compared, pulled, time.perf_counter() - start, command)
+    print(report)
     if options.out:
-        write_text(options.out, said)
+        write_text(options.out, report)
 
 
 if __name__ == "__main__":

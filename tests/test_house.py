@@ -1,5 +1,7 @@
 """The house itself: names that exist, imports that stay light, declarations that match what is installed."""
 
+import ast
+import importlib
 import re
 import subprocess
 import sys
@@ -13,6 +15,7 @@ import neurosym
 
 ROOT = Path(__file__).parent.parent
 PYPROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
+OURS = ("neurosym", "domains", "planners", "learned_priors")
 HEAVY = ("fcl", "ompl", "torch", "pybullet", "matplotlib", "viser")
 
 
@@ -89,6 +92,16 @@ def test_no_test_or_example_hides_a_package():
     packages = {"neurosym", "domains", "planners", "learned_priors"}
     for folder in ("tests", "examples", "benchmarks"):
         assert not packages & {path.stem for path in (ROOT / folder).iterdir()}, f"{folder}/ hides a package"
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "benchmarks").glob("*.py")), ids=lambda path: path.stem)
+def test_what_a_benchmark_imports_is_there(path: Path):
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").partition(".")[0] in OURS:
+            module = importlib.import_module(node.module or "")
+            for name in node.names:
+                if not hasattr(module, name.name):
+                    importlib.import_module(f"{node.module}.{name.name}")
 
 
 def test_every_direct_dependency_is_pinned():
