@@ -45,4 +45,5 @@ class Nogoods:
         # Backwards the pairs change places: all of the second are done, none of the first.
         done, left = (~used, used) if self._backwards else (used, ~used)
         known = self._everywhere
-        return [a for a in actions if a not in refused and all(u & done or g & left for g, u in known.get(a, ()))]
+        possible = [a for a in actions if a not in refused]
+        return [a for a in possible if a not in known or all(u & done or g & left for g, u in known[a])]

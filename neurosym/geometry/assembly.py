@@ -26,6 +26,7 @@ from neurosym.geometry.rigid_motions import are_rigid
 from neurosym.geometry.shapes import Part
 from neurosym.geometry.tolerances import DEFAULT_TOLERANCES, Tolerances
 from neurosym.support.arrays import Array, Numbers
+from neurosym.support.bitsets import bits
 
 #: The height of a table that is not there: infinitely far down, where nothing touches it.
 NO_TABLE = float("-inf")
@@ -178,7 +179,7 @@ class Assembly:
 
     def in_mask(self, mask: int) -> tuple[str, ...]:
         """Names of the parts in a bitset."""
-        return tuple(n for i, n in enumerate(self.names) if mask >> i & 1)
+        return tuple(self.names[i] for i in bits(mask & (1 << len(self.names)) - 1))
 
     @cached_property
     def fixed_mask(self) -> int:

@@ -11,6 +11,7 @@ import numpy as np
 from neurosym.geometry.shapes import Body, Box, Mesh, Part
 from neurosym.support import arrays
 from neurosym.support.arrays import Array, Numbers, Truths
+from neurosym.support.bitsets import members
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +70,8 @@ class Bodies:
 
     def of(self, parts: int) -> list[int]:
         """Numbers of the bodies of the parts in a bitset."""
-        return [i for i, owner in enumerate(self.owners.tolist()) if parts >> owner & 1]
+        there = members(parts, int(self.owners[-1]) + 1)
+        return np.flatnonzero(there[self.owners]).tolist()
 
     def points(self, parts: int) -> Array:
         """float64 (k, 3): the vertices of the parts in a bitset, in the world."""

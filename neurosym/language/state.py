@@ -41,7 +41,8 @@ class AtomSet:
         return tuple(o for o in self._objects if Atom(fluent, (o,)) in self.atoms)
 
     def mask(self, fluent: Fluent, names: tuple[str, ...]) -> int:
-        return sum(1 << i for i, name in enumerate(names) if Atom(fluent, (name,)) in self.atoms)
+        there = {atom.args for atom in self.atoms if atom.predicate is fluent}
+        return sum(1 << i for i, name in enumerate(names) if (name,) in there)
 
 
 class BitState:

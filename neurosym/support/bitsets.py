@@ -4,10 +4,13 @@ import itertools
 
 import numpy as np
 
-from neurosym.support.arrays import Numbers
+from neurosym.support.arrays import Numbers, Truths
 
 #: Up to so many bodies a table of all pairs is filled at once (16 MB).
 _DENSE = 4_000
+
+#: From so many bits on, arrays unpack them sooner than integers do.
+_MANY = 32
 
 
 def bitsets(pairs: Numbers, count: int) -> list[int]:
@@ -30,9 +33,17 @@ def bitsets(pairs: Numbers, count: int) -> list[int]:
 
 def bits(mask: int) -> list[int]:
     """Numbers of the bits that are set."""
+    if mask.bit_count() > _MANY:
+        return np.flatnonzero(members(mask, mask.bit_length())).tolist()
     found = []
     while mask:
         low = mask & -mask
         found.append(low.bit_length() - 1)
         mask ^= low
     return found
+
+
+def members(mask: int, count: int) -> Truths:
+    """bool (count,): which of the first bits are set."""
+    packed = (mask & (1 << count) - 1).to_bytes(-(-count // 8), "little")
+    return np.unpackbits(np.frombuffer(packed, dtype=np.uint8), count=count, bitorder="little").astype(bool)
