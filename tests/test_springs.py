@@ -7,8 +7,8 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 from mujoco_referee import settled
+from scipy.spatial.transform import Rotation
 from structures import CASES, Case, assembly, between_walls, box, card_house, harmonic_stack, hull, plug, prism
 
 import neurosym as ns
@@ -324,6 +324,76 @@ def test_a_load_moves_a_block_beyond_its_friction():
         assert stability.settled(0b1, loads=low).stands is stays
         assert stability.settled(0b1, loads=load).stands is stays
     assert not stability.settled(0b1, loads={0: np.array([0, 0, 0, 0.51, 0, 0])}).stands
+
+
+# -- light beside heavy -------------------------------------------------------------------------------------------
+
+#: Structures whose last part may weigh anything: what stands, stands, and what falls, falls.
+UNEQUAL = {
+    "on top": ({"a": box((0, 0, 0), (1, 1, 1)), "b": box((0, 0, 1), (1, 1, 2))}, True),
+    "in mid-air": ({"a": box((0, 0, 0), (1, 1, 1)), "b": box((2, 0, 0.3), (2.3, 0.3, 0.6))}, False),
+    "at a side": ({"a": box((0, 0, 0), (1, 1, 1)), "b": box((1, 0, 0.25), (2, 1, 0.75))}, False),
+    "overhanging": ({"a": box((0, 0, 0), (1, 1, 1)), "b": box((0.6, 0, 1), (1.6, 1, 2))}, False),
+    "a bridge": (
+        {"a": box((0, 0, 0), (1, 1, 1)), "c": box((3, 0, 0), (4, 1, 1)), "b": box((0, 0, 1), (4, 1, 1.2))},
+        True,
+    ),
+    "between free blocks": (
+        {"a": box((0, 0, 0), (1, 1, 1)), "c": box((2, 0, 0), (3, 1, 1)), "b": box((1, 0, 0.4), (2, 1, 0.8))},
+        False,
+    ),
+    "on a plank and its weight": (
+        {
+            "a": box((0, 0, 0), (1, 1, 1)),
+            "plank": box((-0.2, 0, 1), (1.8, 1, 1.2)),
+            "c": box((0, 0, 1.2), (0.5, 1, 2.2)),
+            "b": box((0.5, 0, 1.2), (0.8, 1, 1.5)),
+        },
+        True,
+    ),
+}
+
+
+@pytest.mark.parametrize("rule", ["springs", "limit"])
+@pytest.mark.parametrize("name", UNEQUAL)
+def test_what_stands_does_not_depend_on_the_lightest_part(name, rule):
+    parts, stands = UNEQUAL[name]
+    world = assembly(parts)
+    if rule == "limit" and name == "between free blocks":
+        stands = True  # forces that nothing presses could hold it
+    for exponent in range(-14, 15, 2):
+        last = replace(world.parts[-1], density=10.0**exponent)
+        geometry = AssemblyGeometry(ns.Assembly((*world.parts[:-1], last)), rule=rule)
+        verdict = geometry.stability.standing(everything(world)).stands
+        if name == "between free blocks" and rule == "limit" and exponent > 0:
+            continue  # what could hold a light block tips over beside a heavy one
+        assert verdict is stands, f"{name}, {rule}: density 1e{exponent}"
+
+
+def test_a_weight_holds_a_plank_from_one_ratio_on():
+    parts = {
+        "a": box((0, 0, 0), (1, 1, 1)),
+        "plank": box((-0.2, 0, 1), (2.6, 1, 1.2)),
+        "weight": box((0.1, 0, 1.2), (0.4, 1, 1.7)),
+    }
+    # The plank weighs .56, .2 beyond the edge; the weight .15 of its density, .75 on this side of it.
+    for rule in ("springs", "limit"):
+        for density in (1e-12, 1e-6, 0.1, 10.0, 1e6, 1e12):
+            world = assembly(parts)
+            heavier = ns.Assembly((*world.parts[:-1], replace(world.parts[-1], density=density)))
+            for factor in (1e-12, 1.0, 1e12):
+                geometry = AssemblyGeometry(rebuilt(heavier, density=factor), rule=rule)
+                assert geometry.stability.standing(0b111).stands is (density > 1), (rule, density, factor)
+
+
+@pytest.mark.parametrize("size", [0.1, 1e-2, 2e-4, 1e-4, 1e-6])
+@pytest.mark.parametrize("stability", ["springs", "limit"])
+def test_a_speck_does_not_float(size, stability):
+    world = assembly(
+        {"big": box((-0.5, -0.5, 0), (0.5, 0.5, 1)), "small": box((2, 0, 0.3), (2 + size, size, 0.3 + size))}
+    )
+    result = ns.solve(ns.load_domain("assembly").problem(world, stability=stability))
+    assert result.status is ns.Status.UNSOLVABLE
 
 
 # -- against simulation -------------------------------------------------------------------------------------------

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg.lapack import dpbtrf, dpbtrs
@@ -10,6 +10,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from neurosym.geometry.stability import spring_kernels as kernels
+from neurosym.geometry.stability.equilibrium import LIGHTEST
 from neurosym.geometry.stability.springs import Springs
 from neurosym.support.arrays import Array, Numbers, Truths
 from neurosym.support.deadline import check
@@ -56,11 +57,27 @@ def settle(
 ) -> Settled:
     """Let parts settle under a load while all others stay where they are.
 
+    Where rounding would drown a weight beside the heaviest, a little more makes no difference to that one; and where
+    the springs are too stiff for all of them, they are counted in the heaviest.
+
     Args:
         parts: int64 (m,): those that can move. corners: int64 (k,): those of `springs` that are there, at these parts.
         load: float64 (n, 6), scaled: `Springs.gravity` and what is added to it.
         slippery: bool (k,): corners without friction.
     """
+    heaviest = float(springs.weights[parts].max(initial=0.0))
+    light = parts[springs.weights[parts] < LIGHTEST * heaviest]
+    if not len(light) and (heaviest >= LIGHTEST or not heaviest):
+        return _settle(springs, parts, corners, load, slippery)
+    load = load.copy()
+    load[light] *= (LIGHTEST * heaviest / springs.weights[light])[:, None]
+    unit = heaviest if heaviest < LIGHTEST else 1.0
+    counted = replace(springs, weights=np.maximum(springs.weights, LIGHTEST * heaviest) / unit)
+    settled = _settle(counted, parts, corners, load / unit, slippery)
+    return replace(settled, forces=settled.forces * unit)
+
+
+def _settle(springs: Springs, parts: Numbers, corners: Numbers, load: Array, slippery: Truths | None) -> Settled:
     numbers = springs.numbers
     system = _System(springs, parts, corners, load)
     m, k = len(parts), len(corners)

@@ -10,6 +10,7 @@ import numpy as np
 
 from neurosym.geometry.contact.contacts import Contact
 from neurosym.geometry.stability.contact_springs import contact_springs
+from neurosym.geometry.stability.equilibrium import LIGHTEST
 from neurosym.geometry.stability.holding import parts_to_hold
 from neurosym.geometry.stability.load_paths import LEVEL, LoadPaths
 from neurosym.geometry.stability.patches import neighbours
@@ -234,12 +235,19 @@ class SpringStability:
         if self._paths is not None and self._pushes_balance(group, there):
             self.asked["pushes"] += 1
             return SpringStanding(True)
+        light, light_stand = self._light(group), True
+        for few in self.groups(light):
+            answer = self._group(few, self.next_to(few) & there & ~light)
+            if not answer.stands and answer.promises:
+                return SpringStanding(False, answer.moving, balanced=False)
+            light_stand &= answer.stands
         self.asked["springs"] += 1
         tell("what stands", self.asked["springs"])
         settled = self.settled(there, around)
-        if settled.stands:
-            return SpringStanding(True)
         moving = moving_parts(settled)
+        # What stands though nothing heavy gives way stands by its own weight, not by the one that it was given there.
+        if settled.stands or (light_stand and not moving & ~light):
+            return SpringStanding(True)
         if self._upright:
             near = self.next_to(moving) & there & ~moving
             by_limit = self.limit.standing(moving | near, near)
@@ -272,6 +280,11 @@ class SpringStability:
                 if not self.limit.standing(around | 1 << part, around).stands:
                     return 1 << part
         return 0
+
+    def _light(self, group: int) -> int:
+        """Bitset of the parts of a group whose weight rounding would drown beside the heaviest of it."""
+        parts = bits(group)
+        return sum(1 << p for p, small in zip(parts, self.masses[parts] < LIGHTEST * self.masses[parts].max()) if small)
 
     def next_to(self, parts: int) -> int:
         """Bitset of the parts that touch some of those in a bitset."""

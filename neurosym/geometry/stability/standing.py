@@ -9,12 +9,14 @@ about similar subsets most answers are local, each proved by itself:
 
 * movable parts that hang together by no contacts stand or fall by themselves, and are judged and remembered so;
 * forces of a subset that stood may balance a smaller one as they are, or when only those near what left are changed;
-* parts that fall although all others were immovable fall in any case.
+* parts that fall although all others were immovable fall in any case. Parts so light that rounding would drown their
+  weight beside the heaviest are asked so first, among themselves.
 """
 
 from __future__ import annotations
 
 import functools
+import math
 from collections import OrderedDict, deque
 from dataclasses import dataclass
 
@@ -22,7 +24,7 @@ import numpy as np
 
 from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.contact.contacts import TABLE, Contact
-from neurosym.geometry.stability.equilibrium import BALANCE, CONE_EDGES, QUICK, THOROUGH, Balance, Equilibrium
+from neurosym.geometry.stability.equilibrium import BALANCE, CONE_EDGES, LIGHTEST, QUICK, THOROUGH, Balance, Equilibrium
 from neurosym.geometry.stability.holding import Standing, parts_to_hold
 from neurosym.geometry.stability.linear_program import solve_program
 from neurosym.geometry.stability.patches import masses, merged_patches, neighbours
@@ -57,18 +59,30 @@ class Stability:
     Args:
         contacts: of the assembly.
         remember: whether answers are kept; otherwise each question is solved anew.
+        heaviest: heavier parts than this count as so heavy: for questions in which they cannot move.
 
     Attributes:
         masses: float64 (n_parts,): density times volume.
         touching: touching[i] is a bitset of the parts in contact with part i.
         on_table: bitset of the parts in contact with the table.
         supports: supports[i] is a bitset of the parts with a contact under part i (normal within 45 degrees).
+        light: bitset of the parts below `LIGHTEST` of the heaviest.
         asked: how the questions so far were answered: {"kept", "near", "whole", "program"} -> how many.
     """
 
-    def __init__(self, assembly: Assembly, contacts: tuple[Contact, ...], *, remember: bool = True) -> None:
+    def __init__(
+        self,
+        assembly: Assembly,
+        contacts: tuple[Contact, ...],
+        *,
+        remember: bool = True,
+        heaviest: float = math.inf,
+    ) -> None:
         self.assembly, self.remember = assembly, remember
-        self.masses, self._centres = masses(assembly)
+        own, self._centres = masses(assembly)
+        self.masses = np.minimum(own, heaviest)
+        self.light = sum(1 << int(p) for p in np.flatnonzero(self.masses < LIGHTEST * self.masses.max()))
+        self._contacts = contacts
         patches = merged_patches(assembly, contacts)
         self.touching, self.supports, self.on_table = neighbours(patches, len(assembly))
         self.equilibrium = Equilibrium(assembly, patches, self.masses, self._centres)
@@ -157,6 +171,10 @@ class Stability:
             if not moving & ~movable and not subset & ~known:
                 self.asked["kept"] += 1
                 return Standing(False, moving, held)
+        if movable & self.light:
+            alone = self._lighter.standing(subset, subset & ~(movable & self.light))
+            if not alone.stands or not movable & ~self.light:
+                return Standing(alone.stands, alone.moving, held)
         question = self._question(subset, movable)
         if not len(question.parts):
             return Standing(True, 0, held)
@@ -180,6 +198,12 @@ class Stability:
             balance = self.equilibrium.balance(question.parts, question.corners, weights, balance.forces, steps)
         self.asked["program"] += 1
         return self.by_program(subset, held)
+
+    @functools.cached_property
+    def _lighter(self) -> Stability:
+        """For questions in which none but light parts can move."""
+        most = float(self.masses[bits(self.light)].max())
+        return Stability(self.assembly, self._contacts, remember=self.remember, heaviest=most)
 
     def _similar(self, subset: int, held: int) -> Array | None:
         """Forces of the most similar subset that stood, float64 (all corners, CONE_EDGES).
