@@ -18,9 +18,18 @@ exception: it is a `PlanResult`.
 import difflib
 from collections.abc import Iterable
 
+#: Characters of a message: of a longer one the middle is left out.
+LONGEST = 1_000
+
 
 class NeurosymError(Exception):
     """Base of everything this library raises on purpose."""
+
+    def __init__(self, message: str = "") -> None:
+        if len(message) > LONGEST:
+            start, end = 2 * LONGEST // 3, LONGEST // 4
+            message = f"{message[:start]} ... {len(message) - start - end:,} more characters ... {message[-end:]}"
+        super().__init__(message)
 
 
 class DefinitionError(NeurosymError):

@@ -17,6 +17,7 @@ import typer
 from neurosym.errors import InputError
 from neurosym.language.options import read_options
 from neurosym.language.problem_family import ProblemFamily, Progress
+from neurosym.support.documents import read_json
 from neurosym.support.files import write_text
 from neurosym.support.progress import heard_by, silent
 
@@ -86,13 +87,10 @@ class SearchOptions:
         """The user's puzzle, {name: [[x, y, z], ...]}, if there is one. Raises InputError: a file that has none."""
         if self.cells is None:
             return None
-        expected = f'Expected JSON {{"name": [[x, y, z], ...]}} in {self.cells}; got'
-        try:
-            given = json.loads(self.cells.read_text(encoding="utf-8"), object_pairs_hook=_each_once)
-        except ValueError as error:
-            raise InputError(f"{expected}: {error}.") from None
+        what = 'JSON {"name": [[x, y, z], ...]}'
+        given = read_json(self.cells, what, InputError)
         if not isinstance(given, dict) or not all(isinstance(own, list) for own in given.values()):
-            raise InputError(f"{expected} something else.")
+            raise InputError(f"Expected {what} in {self.cells}; got something else.")
         return given
 
 
@@ -102,15 +100,6 @@ def pair_of(text: str) -> tuple[str, str]:
     if len(names) != 2 or not all(names):
         raise InputError(f"Expected --before A,B: two names with a comma between; got {text!r}.")
     return names[0], names[1]
-
-
-def _each_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """A JSON object whose keys differ: of two pieces of one name, JSON itself would silently drop the first."""
-    names = [key for key, _ in pairs]
-    twice = sorted({n for n in names if names.count(n) > 1})
-    if twice:
-        raise ValueError(f"{', '.join(twice)} comes twice")
-    return dict(pairs)
 
 
 @dataclass(frozen=True)

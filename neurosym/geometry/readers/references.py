@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
@@ -69,7 +70,7 @@ def referenced(given: Any, beside: Path) -> Assembly:
     if not isinstance(path, str):
         raise InputError(f'Expected "assembly" in {beside} with the "path" of an assembly; got {given!r}.')
     places = [Path(path), beside.parent / Path(path).name]
-    place = next(filter(Path.exists, places), None)
+    place = next(filter(os.path.exists, places), None)
     if place is None:
         raise InputError(f"Expected the assembly of {beside} at {places[0]} or at {places[1]}; it is in neither place.")
     assembly = Reading.from_json(given).load(place)
