@@ -8,8 +8,9 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.neurosym-installed
 SRC := neurosym domains planners learned_priors tests examples $(wildcard benchmarks)
 OUT ?= out/compare-soma
+FUZZ_SECONDS ?= 3600
 
-.PHONY: help setup demo readme reproduce results test check bench docs clean constraints
+.PHONY: help setup demo readme reproduce results test fuzz check bench docs clean constraints
 
 help:
 	@echo "make demo       compare planners and priors on the 120 test cubes (table, results.csv, iterations.png)"
@@ -17,6 +18,7 @@ help:
 	@echo "make results    docs/results.md and its figures, from the last runs of make reproduce"
 	@echo "make test       the whole test suite"
 	@echo "make docs       the site in site/, links checked, without the network"
+	@echo "make fuzz       broken documents, and random assemblies against brute force (FUZZ_SECONDS=$(FUZZ_SECONDS))"
 	@echo "make check      ruff, mypy --strict, import-linter"
 	@echo "make bench      the benchmarks"
 	@echo "make setup      only make the virtual environment (VENV=$(VENV) PYTHON=$(PYTHON))"
@@ -54,6 +56,9 @@ results: $(STAMP)
 # Two processes, one thread each: numerical libraries that start threads of their own on a shared machine crawl.
 test: $(STAMP)
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2
+
+fuzz: $(STAMP)
+	OMP_NUM_THREADS=1 PYTHONPATH=tests/fuzz $(BIN)/python tests/fuzz/run.py $(FUZZ_SECONDS)
 
 check: $(STAMP)
 	$(BIN)/ruff check .

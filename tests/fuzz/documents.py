@@ -123,7 +123,6 @@ READERS: dict[str, Callable[[Path], object]] = {
 
 def sound(folder: Path) -> dict[str, list[Any]]:
     """Sound documents by kind: JSON as values, others as bytes."""
-    family = ns.load_domain("assembly")
     cells = {"a": [(0, 0, 0), (1, 0, 0)], "b": [(0, 0, 1), (1, 0, 1)], "c": [(0, 1, 0)]}
     assembly = ns.Assembly.from_cells(cells)
     assembly.save(folder / "own.json")
@@ -139,7 +138,11 @@ def sound(folder: Path) -> dict[str, list[Any]]:
         ],
     }
     plans = []
-    for words in (["soma", "--problem", "7"], [str(folder / "own.json")], ["assembly", "--problem", "1", "--paths", "any"]):
+    for words in (
+        ["soma", "--problem", "7"],
+        [str(folder / "own.json")],
+        ["assembly", "--problem", "1", "--paths", "any"],
+    ):
         done = CliRunner().invoke(cli.app, ["plan", *words, "--out", str(folder / "plan.json")])
         assert done.exit_code == 0, done.output
         plans.append(json.loads((folder / "plan.json").read_text()))
@@ -165,8 +168,10 @@ def trial(kind: str, whole: Any, rng: np.random.Generator, folder: Path) -> str 
     try:
         READERS[kind](path)
     except ns.NeurosymError as error:
-        return None if len(str(error)) <= LONGEST else f"a message of {len(str(error)):,} characters: {str(error)[:200]}"
-    except Exception as error:  # noqa: BLE001
+        return (
+            None if len(str(error)) <= LONGEST else f"a message of {len(str(error)):,} characters: {str(error)[:200]}"
+        )
+    except Exception as error:
         return f"{type(error).__name__}: {error}"[:300]
     return None
 
