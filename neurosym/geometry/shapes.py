@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from neurosym.errors import AssemblyError
-from neurosym.geometry.tolerances import DEFAULT_TOLERANCES
 from neurosym.support.arrays import Array, Numbers
 
 #: How long a body may be, in its unit: beyond, squares and cubes of lengths lose all digits.
@@ -16,8 +15,8 @@ SMALLEST, LARGEST = 1e-9, 1e9
 #: What a density may be, bodies of one part among each other left out.
 LIGHTEST, HEAVIEST = 1e-30, 1e30
 
-#: Of a body's thickness: steps of coordinates that count.
-TOUCH = DEFAULT_TOLERANCES.touch
+#: Of a body's thickness: steps of coordinates that count, as `Tolerances.touch` by default.
+TOUCH = 1e-3
 
 #: Corners of a unit box about the origin, and its twelve triangles with outward normals.
 _CORNERS = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
