@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 from domains.assembly_paths import NoWay, check_motion, way_out
 from domains.assembly_pull import drawn_out
+from domains.assembly_scope import covering
 from domains.assembly_targets import Relaxation
-from domains.assembly_why import explain_building, explain_removal, refute_removal
+from domains.assembly_why import explain_building, explain_removal, falls_at_first, refute_removal, together
 from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.grouping import need_not_part
 from neurosym.geometry.queries import AssemblyGeometry
@@ -97,15 +98,20 @@ class RemovalSemantics(Semantics):
 
     def refute(self, problem: Problem) -> WhyNot | None:
         assert problem.geometry is not None
-        return refute_removal(problem.geometry, self.setting)
+        if problem.symbols.is_goal(problem.symbols.initial):
+            return None
+        at_first = falls_at_first(problem.geometry, self.setting)
+        return covering(problem, self.setting, together(at_first, refute_removal(problem.geometry, self.setting)))
 
     def explain(self, problem: Problem, done: Sequence[str]) -> WhyNot | None:
         assert problem.geometry is not None
-        return explain_removal(problem.geometry, self.setting, problem.before, tuple(done))
+        why = explain_removal(problem.geometry, self.setting, problem.before, tuple(done))
+        return covering(problem, self.setting, why)
 
     def explain_from_goal(self, problem: Problem, undone: Sequence[str]) -> WhyNot | None:
         assert problem.geometry is not None
-        return explain_building(problem.geometry, self.setting, problem.before, tuple(undone))
+        why = explain_building(problem.geometry, self.setting, problem.before, tuple(undone))
+        return covering(problem, self.setting, why)
 
 
 def can_leave(setting: Setting) -> Derived:

@@ -20,7 +20,7 @@ class Status(Enum):
 
     SOLVED = ("A plan was found.", 0)
     UNSOLVABLE = ("Proved: no order of these actions reaches the goal.", 11)
-    GAVE_UP = ("No plan was found, and none was ruled out; a complete planner may know more.", 12)
+    GAVE_UP = ("No plan was found, and none was ruled out.", 12)
     OUT_OF_BUDGET = ("The budget ended first; the best prefix is kept. Give more, or a better prior.", 23)
 
     def __init__(self, sentence: str, exit_code: int) -> None:
