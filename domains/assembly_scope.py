@@ -41,7 +41,7 @@ def _wider(problem: Problem, setting: Setting, why: WhyNot) -> tuple[Wider, ...]
     if setting.gravity and why.falls:
         more = setting.held + 1
         offered += [Wider("held", more, f"--held {more}"), Wider("gravity", False, "--no-gravity")]
-    if not setting.groups and (why.blocked or not why.waiting):
+    if not setting.groups and (why.blocked or (why.stands and not why.waiting)):
         offered.append(Wider("groups", True, "--groups"))
     if setting.paths == "straight" and why.blocked:
         offered.append(Wider("paths", "any", "--paths any"))

@@ -109,7 +109,7 @@ def plan(
         except OutOfTime:
             say(f"The budget of {search.seconds:g} seconds ended while {path} was read. Give more: --seconds.")
             raise typer.Exit(Status.OUT_OF_BUDGET.exit_code) from None
-        source = {"assembly": reference(path, files.reading(), assembly)}
+        source = {"assembly": reference(path, files.reading(), assembly), "notes": [str(n) for n in assembly.notes]}
         options = options | {"stability": problem.details["stability"]}
     prior = search.prior
     if prior is None:

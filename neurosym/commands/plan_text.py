@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from neurosym.support.words import counted, joined, listed
+from neurosym.support.words import LISTED, counted, joined, listed
 
 if TYPE_CHECKING:
     from neurosym.language.problem import Problem
@@ -33,6 +33,13 @@ def show(problem: Problem, results: Sequence[PlanResult], answer: Mapping[str, A
         _show_failure(problem, best, answer)
     counts = {"iteration": best.iterations, "attempt": best.attempts, "expansion": best.expansions}
     print(f"{', '.join(counted(n, what) for what, n in counts.items())}, {1000 * best.seconds:.1f} ms")
+    notes = list(answer.get("notes", ()))
+    if notes:
+        print("Loading:")
+    for note in notes[: LISTED - 1] if len(notes) > LISTED else notes:
+        print(f"  {note}")
+    if len(notes) > LISTED:
+        print(f"  and {counted(len(notes) - LISTED + 1, 'note')} more; --json has all.")
     for rank, other in enumerate(results if len(results) > 1 else (), 1):
         cost = "" if other.cost is None else f"  (cost {other.cost:.3f} nats)"
         print(f"plan {rank}: {' '.join(other.plan or ())}{cost}")
