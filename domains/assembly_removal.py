@@ -10,6 +10,7 @@ from domains.assembly_paths import NoWay, check_motion, way_out
 from domains.assembly_pull import drawn_out
 from domains.assembly_scope import covering
 from domains.assembly_targets import Relaxation
+from domains.assembly_twins import twins
 from domains.assembly_why import explain_building, explain_removal, falls_at_first, refute_removal, together
 from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.grouping import need_not_part
@@ -91,6 +92,9 @@ class RemovalSemantics(Semantics):
         count, order = self.relaxation.smallest(BitState(ground, state).mask(present, names))
         number = {name: action for action, name in enumerate(ground.actions)}
         return RelaxedPlan(count, tuple(number[names[part]] for part in order))
+
+    def interchangeable(self, problem: Problem) -> Sequence[Sequence[str]]:
+        return twins(self.relaxation.geometry, self.setting, self.relaxation)
 
     def side(self, problem: Problem) -> str:
         """What cannot be taken apart cannot be built either, and where little is there that is often seen sooner."""

@@ -87,6 +87,8 @@ def count(
         least = "" if counted.exact else "At least "
         states = numbered(counted.states, "state")
         print(f"{least}{numbered(counted.orders, 'order')} ({states}, {counted.seconds:.2f} s)")
+        if counted.told_apart not in (None, counted.orders):
+            print(f"Equal parts that may be swapped count as one; told apart, {counted.told_apart:,} orders.")
     if not counted.exact or counted.orders is None:
         raise typer.Exit((Status.OUT_OF_BUDGET if counted.orders is None else Status.GAVE_UP).exit_code)
 

@@ -114,13 +114,15 @@ class OrderCount:
     """In how many orders a goal can be reached.
 
     `orders`: the number; None where the budget ended first. `exact`: whether there are no others; False where something
-    was refused without proof. `states`: how many were looked at. `seconds`: wall-clock time.
+    was refused without proof. `states`: how many were looked at. `seconds`: wall-clock time. `told_apart`:
+    how many there are where interchangeable actions, which `orders` counts once, are told apart.
     """
 
     orders: int | None
     exact: bool
     states: int
     seconds: float
+    told_apart: int | None = None
 
     def as_json(self) -> dict[str, Any]:
         """For a file."""
