@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 from domains.assembly_paths import NoWay, check_motion, way_out
 from domains.assembly_pull import drawn_out
+from domains.assembly_scope import covering
 from domains.assembly_targets import Relaxation
-from domains.assembly_why import explain_building, explain_removal, refute_removal
+from domains.assembly_twins import twins
+from domains.assembly_why import explain_building, explain_removal, falls_at_first, refute_removal, together
 from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.grouping import need_not_part
 from neurosym.geometry.queries import AssemblyGeometry
@@ -91,21 +93,29 @@ class RemovalSemantics(Semantics):
         number = {name: action for action, name in enumerate(ground.actions)}
         return RelaxedPlan(count, tuple(number[names[part]] for part in order))
 
+    def interchangeable(self, problem: Problem) -> Sequence[Sequence[str]]:
+        return twins(self.relaxation.geometry, self.setting, self.relaxation)
+
     def side(self, problem: Problem) -> str:
         """What cannot be taken apart cannot be built either, and where little is there that is often seen sooner."""
         return "both"
 
     def refute(self, problem: Problem) -> WhyNot | None:
         assert problem.geometry is not None
-        return refute_removal(problem.geometry, self.setting)
+        if problem.symbols.is_goal(problem.symbols.initial):
+            return None
+        at_first = falls_at_first(problem.geometry, self.setting)
+        return covering(problem, self.setting, together(at_first, refute_removal(problem.geometry, self.setting)))
 
     def explain(self, problem: Problem, done: Sequence[str]) -> WhyNot | None:
         assert problem.geometry is not None
-        return explain_removal(problem.geometry, self.setting, problem.before, tuple(done))
+        why = explain_removal(problem.geometry, self.setting, problem.before, tuple(done))
+        return covering(problem, self.setting, why)
 
     def explain_from_goal(self, problem: Problem, undone: Sequence[str]) -> WhyNot | None:
         assert problem.geometry is not None
-        return explain_building(problem.geometry, self.setting, problem.before, tuple(undone))
+        why = explain_building(problem.geometry, self.setting, problem.before, tuple(undone))
+        return covering(problem, self.setting, why)
 
 
 def can_leave(setting: Setting) -> Derived:

@@ -80,7 +80,6 @@ def plans(
     """The k best plans, the likeliest first (planners whose traits say `k_best`); with None one, as `solve`."""
     searcher = load_planner(planner)
     generator = guarded(problem, searcher, k, budget, rng)
-    side = side_of(problem, searcher, side, alone=k is None and oracle == "geometry")
     budget, by_geometry, start = budget or Budget(), oracle == "geometry", time.perf_counter()
 
     def spent() -> float:
@@ -88,6 +87,7 @@ def plans(
 
     try:
         with within(_with_grace(budget)):
+            side = side_of(problem, searcher, side, alone=k is None and by_geometry)
             scores = advice(problem, prior)
             if by_geometry and (why_not := problem.semantics.refute(problem)) is not None:
                 none = PlanResult(Status.UNSOLVABLE, None, 0, 0, 0, spent(), why_not=why_not)
@@ -193,7 +193,7 @@ def count_orders(problem: Problem, *, budget: Budget | None = None) -> OrderCoun
     try:
         with within(_with_grace(budget)):
             if problem.semantics.refute(problem) is not None:
-                return OrderCount(0, True, 0, time.perf_counter() - start)
+                return OrderCount(0, True, 0, time.perf_counter() - start, 0)
             search = problem.ground()
             return _counter().count_orders(search, budget=budget.less(time.perf_counter() - start))
     except OutOfTime:

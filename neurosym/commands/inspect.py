@@ -18,6 +18,7 @@ from neurosym.commands.common import (
     progress_bar,
 )
 from neurosym.errors import InputError
+from neurosym.support.words import counted as numbered
 from neurosym.support.words import joined
 
 if TYPE_CHECKING:
@@ -80,11 +81,14 @@ def count(
     if as_json:
         print_json({"path": str(path), **counted.as_json()})
     elif counted.orders is None:
-        looked = f"{counted.states:,} states in {counted.seconds:.1f} s"
+        looked = f"{numbered(counted.states, 'state')} in {counted.seconds:.1f} s"
         print(f"The budget ended after {looked}, so there is no number. Give more: --seconds, --expansions.")
     else:
         least = "" if counted.exact else "At least "
-        print(f"{least}{counted.orders:,} orders ({counted.states:,} states, {counted.seconds:.2f} s)")
+        states = numbered(counted.states, "state")
+        print(f"{least}{numbered(counted.orders, 'order')} ({states}, {counted.seconds:.2f} s)")
+        if counted.told_apart not in (None, counted.orders):
+            print(f"Equal parts that may be swapped count as one; told apart, {counted.told_apart:,} orders.")
     if not counted.exact or counted.orders is None:
         raise typer.Exit((Status.OUT_OF_BUDGET if counted.orders is None else Status.GAVE_UP).exit_code)
 
@@ -150,7 +154,8 @@ def _level(problem: Problem) -> int | None:
 
 def _show(problem: Problem, inspection: Inspection) -> None:
     unit = problem.world.units or "units"
-    counts = f"{len(inspection.parts)} parts, {len(inspection.contacts)} pairs in contact"
+    pairs = f"{numbered(len(inspection.contacts), 'pair')} in contact"
+    counts = f"{numbered(len(inspection.parts), 'part')}, {pairs}"
     print(f"{problem.name}: {counts}; lengths in {unit}")
     _lines([f"{p.name}: volume {p.volume:.4g}{', fixed' if p.fixed else ''}" for p in inspection.parts], "parts")
     _lines([f"Kept together: {joined(own)}" for own in inspection.kept], "groups")

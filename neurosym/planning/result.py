@@ -20,7 +20,7 @@ class Status(Enum):
 
     SOLVED = ("A plan was found.", 0)
     UNSOLVABLE = ("Proved: no order of these actions reaches the goal.", 11)
-    GAVE_UP = ("No plan was found, and none was ruled out; a complete planner may know more.", 12)
+    GAVE_UP = ("No plan was found, and none was ruled out.", 12)
     OUT_OF_BUDGET = ("The budget ended first; the best prefix is kept. Give more, or a better prior.", 23)
 
     def __init__(self, sentence: str, exit_code: int) -> None:
@@ -114,13 +114,15 @@ class OrderCount:
     """In how many orders a goal can be reached.
 
     `orders`: the number; None where the budget ended first. `exact`: whether there are no others; False where something
-    was refused without proof. `states`: how many were looked at. `seconds`: wall-clock time.
+    was refused without proof. `states`: how many were looked at. `seconds`: wall-clock time. `told_apart`:
+    how many there are where interchangeable actions, which `orders` counts once, are told apart.
     """
 
     orders: int | None
     exact: bool
     states: int
     seconds: float
+    told_apart: int | None = None
 
     def as_json(self) -> dict[str, Any]:
         """For a file."""

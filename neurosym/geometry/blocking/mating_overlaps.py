@@ -15,7 +15,8 @@ from neurosym.support.compiled import compiled
 from neurosym.support.deadline import check, portions
 
 #: Share of the smallest extent that counts as an overlap at rest, however coarse `touch` is: along an oblique joint a
-#: layer thinner than `touch` may yet be deeper and wider than it.
+#: layer thinner than `touch` may yet be deeper and wider than it. Half of `touch` where that is less: no overlap is too
+#: much for touch and too little for this.
 OVERLAP = 1e-3
 
 
@@ -50,7 +51,7 @@ class MatingOverlaps:
 
 def mating_overlaps(assembly: Assembly, surfaces: BodySurfaces) -> MatingOverlaps:
     """The facet of either hull that is overlapped least shows the shortest way apart (up to edges against edges)."""
-    bounds, half = assembly.body_bounds, min(assembly.touch, OVERLAP * assembly.smallest_extent) / 2
+    bounds, half = assembly.body_bounds, min(assembly.touch / 2, OVERLAP * assembly.smallest_extent) / 2
     near = overlapping_pairs(bounds[:, 0] + half, bounds[:, 1] - half, assembly.owners)
     if not len(near):
         return MatingOverlaps(near, np.zeros((0, 3)), len(assembly.bodies))

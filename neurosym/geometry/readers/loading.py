@@ -22,6 +22,7 @@ from neurosym.geometry.mesh import triangles
 from neurosym.geometry.notes import FaultyPartsError, Note
 from neurosym.geometry.readers.assembly_json import read_json
 from neurosym.geometry.readers.burrtools import read_xmpuzzle
+from neurosym.geometry.readers.clearances import with_clearances
 from neurosym.geometry.readers.contents import Contents, RawMesh, subassemblies
 from neurosym.geometry.readers.conversion import in_units, upright
 from neurosym.geometry.readers.folder import MESHES, read_folder, read_mesh
@@ -81,6 +82,7 @@ def load(
     units: str | None = None,
     fixed: Iterable[str] = (),
     tolerances: Tolerances | None = None,
+    touching_gaps: bool = False,
     friction: float | None = None,
     up: str | None = None,
     problem: int = 1,
@@ -100,6 +102,8 @@ def load(
         fixed: names of parts that never move, besides those that the files name.
         tolerances: kept as they are where given. Otherwise touch is raised so that mating faces that overlap at rest,
             by no more than `tolerances.mate`, count as touching; `notes` says by how much.
+        touching_gaps: whether parts drawn with play, whose faces lie near one another without touching, are taken as
+            touching (`neurosym.geometry.readers.clearances`); else `notes` says what touch that takes.
         friction: Coulomb's coefficient; None: the file's, else 0.5.
         up: "y" or "z", what is up in the files; None: z, but in glTF see `neurosym.geometry.readers.gltf`.
         problem, solution: which of a puzzle file's, counted from 1.
@@ -132,6 +136,7 @@ def load(
         parts=tuple(replace(part, name=name) for part, name in zip(contents.parts, names)),
         fixed=(*contents.fixed, *fixed),
         tolerances=tolerances or contents.tolerances,
+        touching_gaps=touching_gaps,
         friction=contents.friction if friction is None else friction,
         notes=(*notes, *contents.notes, *renamed),
         subassemblies={
@@ -174,11 +179,12 @@ def _checked(contents: Contents, source: str, progress: Progress) -> Assembly:
     mated, mating, deep = mating_tolerances(surfaces, mask, contents.tolerances)
     if faults or deep:
         raise FaultyPartsError(source, [*faults, *deep], contents.hint)
+    mated, near = with_clearances(surfaces, mated, contents.units, touching=contents.touching_gaps)
     ground = float(bodies.bounds[:, 0, 2].min()) if contents.table is None else contents.table
     loose = floating(surfaces, mask, ground, mated.touch * bodies.smallest_extent)
     progress(total, total)
     friction = FRICTION if contents.friction is None else contents.friction
-    notes = (*contents.notes, *mended, *mating, *loose)
+    notes = (*contents.notes, *mended, *mating, *near, *loose)
     groups = (contents.keep, contents.piece_groups, contents.subassemblies)
     made = Assembly(parts, contents.table, friction, mated, held, contents.units, notes, *groups)
     keep_together(made)  # refuses groups that are none
