@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from neurosym.errors import InputError
 from neurosym.support.arrays import Array
@@ -118,6 +117,8 @@ class OrderScores:
 
         With an unsure length, the least over the lengths. Equal costs are broken by `rng` (None: a fixed seed).
         """
+        from scipy.optimize import linear_sum_assignment
+
         rng = rng or np.random.default_rng(0)
         costs = self.costs + rng.random(self.costs.shape) * 1e-9
         if self.log_length is None:

@@ -8,8 +8,8 @@ and body by body; every later question about a subset of the parts is bit arithm
 from __future__ import annotations
 
 from functools import cached_property
+from typing import TYPE_CHECKING
 
-import networkx as nx
 import numpy as np
 
 from neurosym.geometry.blocking.stepping import hits_along
@@ -20,6 +20,9 @@ from neurosym.support.bitsets import bits, bitsets
 from neurosym.support.deadline import check
 from neurosym.support.progress import tell
 from neurosym.support.words import in_words
+
+if TYPE_CHECKING:
+    import networkx as nx
 
 
 class BlockingGraph:
@@ -142,6 +145,8 @@ class BlockingGraph:
         """
         if table and self.into_table[direction]:
             return []
+        import networkx as nx  # not at the top: many commands draw no graph
+
         index = self.assembly.index
         groups = nx.strongly_connected_components(self.graph(direction, among))
         masks = [sum(1 << index[name] for name in group) for group in groups]
@@ -161,6 +166,8 @@ class BlockingGraph:
         A part without outgoing edges is free in this direction; the parts of a strongly connected component
         can leave only together.
         """
+        import networkx as nx
+
         among = (1 << len(self.names)) - 1 if among is None else among
         graph = nx.DiGraph(direction=tuple(map(float, self.directions[direction])))
         for i in bits(among):
