@@ -30,6 +30,7 @@ from neurosym.geometry.shapes import Box
 from neurosym.language import Derived, Fluent, State
 from neurosym.language.formulas import AnyOf, Way
 from neurosym.language.search_problem import Verdict
+from neurosym.language.travel import remade
 from neurosym.support.arrays import Array
 from neurosym.support.bitsets import bits
 
@@ -77,6 +78,7 @@ def _stacks(world: AssemblyGeometry) -> Stacks:
     return Stacks(tuple(own), tuple(o & ~m for o, m in zip(over, own)), tuple(owners))
 
 
+@remade
 def keeps_standing(present: Fluent, rule: str) -> Derived:
     """``keeps_standing(p)``: at most `MAY_MOVE` cubes move when piece p is deleted."""
     limit = MAY_MOVE[rule]

@@ -90,7 +90,8 @@ def plans(
         with within(_with_grace(budget)):
             scores = advice(problem, prior)
             if by_geometry and (why_not := problem.semantics.refute(problem)) is not None:
-                none = PlanResult(Status.UNSOLVABLE, None, 0, 0, 0, spent(), why_not=why_not)
+                known: dict[str, Any] = {"why_not": why_not, "n_actions": len(problem.actions)}
+                none = PlanResult(Status.UNSOLVABLE, None, 0, 0, 0, spent(), **known)
                 return [none] if k is None else []
             with open_oracle(problem, oracle) as search:
                 asked: dict[str, Any] = {"k": k, "budget": budget.less(spent()), "rng": generator, "oracle": oracle}
@@ -145,7 +146,8 @@ def _with_grace(budget: Budget | None) -> float | None:
 
 
 def _bounded(search: SearchProblem[Any], result: PlanResult) -> PlanResult:
-    """The result with whether it has the fewest actions, where the problem has a bound on them."""
+    """The result with how many actions there are, and whether it has the fewest, where the problem has a bound."""
+    result = replace(result, n_actions=len(search.actions))
     known: RelaxedPlan | None = search.relaxed_plan(search.initial) if hasattr(search, "relaxed_plan") else None
     if result.plan is None or known is None:
         return result

@@ -29,21 +29,13 @@ from neurosym.language.options import made
 from neurosym.language.problem_family import ProblemFamily
 from neurosym.plan_files.writing import problem_part, result_part
 from neurosym.support.deadline import OutOfTime, within
-from neurosym.support.words import joined
 
 if TYPE_CHECKING:
     from neurosym.language.problem import Problem
-    from neurosym.language.search_problem import Rejection
     from neurosym.planning.result import PlanResult
 
 #: The prior for assemblies, unless another is named.
 UNTRAINED = "outermost-first"
-
-#: Refusals shown at the end of a search that found nothing; --out keeps all.
-LAST_REFUSALS = 12
-
-#: What ended a search that did not end from its initial state.
-ENDED = {"full": "", "empty": " It was decided from the empty side.", "both": " The two sides met."}
 
 
 def plan(
@@ -195,58 +187,8 @@ def _show(problem: Problem, results: Sequence[PlanResult], answer: dict[str, Any
     best = results[0]
     advice = f"with the prior {answer['prior']}" if answer["prior"] else "without a prior"
     print(f"{problem.name}: {answer['planner']} {advice}, oracle {answer['oracle']}")
-    if best.plan is not None:
-        _show_steps(best.plan, best)
-    print(f"{best.status.sentence}{ENDED[best.side]}")
-    if best.plan is not None and best.fewest is not None:
-        steps = f"{len(best.plan)} step{'' if len(best.plan) == 1 else 's'}"
-        print(f"{steps}; proved fewest." if best.fewest else f"{steps}; not proved fewest.")
-    if best.plan is None:
-        so_far = joined(best.best_prefix) or "nothing"
-        print(f"The longest prefix that works: {so_far} ({len(best.best_prefix)} of {len(problem.actions)}).")
-        if best.best_suffix is not None and best.side != "empty":
-            print(f"From the empty side {len(best.best_suffix)} of {len(problem.actions)} can be undone.")
-    if best.why_not is not None:
-        for sentence in best.why_not.sentences:
-            print(f"  {sentence}")
-    elif best.plan is None:
-        print(f"The last of {best.iterations} refusals:" if best.blame else "Nothing was refused.")
-        for refusal in best.blame[-LAST_REFUSALS:]:
-            print(f"  {_when(refusal)}, not {refusal.action}: {refusal.reason}")
-    counts = {"iteration": best.iterations, "attempt": best.attempts, "expansion": best.expansions}
-    figures = ", ".join(f"{n} {what}{'' if n == 1 else 's'}" for what, n in counts.items())
-    print(f"{figures}, {1000 * best.seconds:.1f} ms")
+    print(best)
     for rank, other in enumerate(results if len(results) > 1 else (), 1):
         cost = "" if other.cost is None else f"  (cost {other.cost:.3f} nats)"
         print(f"plan {rank}: {' '.join(other.plan or ())}{cost}")
 
-
-def _when(refusal: Rejection) -> str:
-    """What was done before an attempt that was refused."""
-    done = joined(refusal.after) or "nothing"
-    return f"after {done}" if refusal.side == "full" else f"from the empty side with {done} undone"
-
-
-def _show_steps(steps: Sequence[str], result: PlanResult) -> None:
-    """The plan and the refusals in the order in which they came; those off the plan's path say after what.
-
-    Where few actions are wanted these are left out: most come after the plan, of the search for a shorter one.
-    """
-    motions = [f"  {motion}" if motion else "" for motion in result.motions] or [""] * len(steps)
-    printed = 0
-
-    def advance(to: int) -> int:
-        for i in range(printed, to):
-            print(f"  {i + 1}. {steps[i]}{motions[i]}")
-        return max(printed, to)
-
-    for refusal in result.blame:
-        depth = len(refusal.after)
-        on_path = refusal.side == "full" and tuple(steps[:depth]) == refusal.after
-        if result.fewest is not None and not on_path:
-            continue  # of the search for a shorter plan
-        if on_path:
-            printed = advance(depth)
-        elsewhere = "" if on_path and depth == printed else f" ({_when(refusal)})"
-        print(f"     not {refusal.action}{elsewhere}: {refusal.reason}")
-    advance(len(steps))

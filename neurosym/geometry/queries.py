@@ -70,6 +70,9 @@ class AssemblyGeometry:
         """The same assembly with nothing known and nothing tabulated."""
         return AssemblyGeometry(self.assembly, tabulate=False, rule=self.rule, tilt=self.tilt)
 
+    def __repr__(self) -> str:
+        return f"AssemblyGeometry({self.assembly!r}, rule={self.rule!r})"
+
     def __len__(self) -> int:
         return len(self.names)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -36,8 +36,8 @@ class Track:
     """
 
     parts: tuple[str, ...]
-    poses: Array
-    centre: Array
+    poses: Array = field(repr=False)
+    centre: Array = field(repr=False)
 
     def at(self, key: float) -> Array:
         """The pose, float64 (4, 4), at a key number from 0 to k - 1, whole or between two."""
