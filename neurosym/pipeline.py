@@ -21,6 +21,7 @@ from neurosym.planning.prior import Prior
 from neurosym.planning.result import OrderCount, PlanResult, Status
 from neurosym.planning.validation import confirm, replay, validate
 from neurosym.registry import load_planner, load_prior
+from neurosym.support.arrays import Array
 from neurosym.support.deadline import OutOfTime, within
 
 #: Seconds beyond the budget for looking over what came out of it: a plan's replay, or why there is none.
@@ -187,6 +188,14 @@ def count_plans(problem: Problem) -> int:
     orders = _counter().count_orders(problem.ground()).orders
     assert orders is not None  # no budget could end it
     return orders
+
+
+def order_marginals(problem: Problem) -> Array:
+    """float64 (N, N): in what share of all orders that solve a problem action j is step i; exact, rows sum to 1.
+
+    Labels for training: a network that is shown single orders learns their accidents by heart.
+    """
+    return _counter().order_marginals(problem.ground())
 
 
 def count_orders(problem: Problem, *, budget: Budget | None = None) -> OrderCount:
