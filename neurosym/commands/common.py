@@ -10,7 +10,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from threading import Timer
-from time import perf_counter
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
@@ -203,29 +202,6 @@ def load_assembly(path: Path, files: FileOptions) -> Assembly:
         raise InputError(f"Expected a file or a folder with an assembly; there is nothing at {path}.")
     with progress_bar(f"reading {path.resolve().name}", after=1.0) as progress:
         return files.reading().load(path, progress)
-
-
-class Spent:
-    """What a command's time was spent on: seconds by name, of everything since it began."""
-
-    def __init__(self) -> None:
-        self.start, self.parts = perf_counter(), dict[str, float]()
-
-    @contextmanager
-    def on(self, what: str) -> Iterator[None]:
-        """Time that is spent inside is counted under a name, if it ends early, too."""
-        start = perf_counter()
-        try:
-            yield
-        finally:
-            self.parts[what] = self.parts.get(what, 0.0) + perf_counter() - start
-
-    @property
-    def seconds(self) -> float:
-        return perf_counter() - self.start
-
-    def __str__(self) -> str:
-        return f"{self.seconds:.1f} s ({', '.join(f'{what} {took:.1f} s' for what, took in self.parts.items())})"
 
 
 def problem_at(path: Path, files: FileOptions, options: dict[str, Any]) -> Problem:

@@ -14,11 +14,11 @@ from neurosym.commands.common import (
     AssemblyPath,
     FileOptions,
     RemovalOptions,
-    Spent,
     print_json,
     problem_at,
     progress_bar,
 )
+from neurosym.commands.spent import Spent
 from neurosym.errors import InputError
 from neurosym.support.words import joined
 

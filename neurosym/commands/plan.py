@@ -16,7 +16,6 @@ from neurosym.commands.common import (
     PictureStyle,
     RemovalOptions,
     SearchOptions,
-    Spent,
     family_options,
     load_assembly,
     print_json,
@@ -25,6 +24,7 @@ from neurosym.commands.common import (
     say,
     write_json,
 )
+from neurosym.commands.spent import Spent
 from neurosym.errors import InputError
 from neurosym.language.options import made
 from neurosym.language.problem_family import ProblemFamily
@@ -107,7 +107,7 @@ def plan(
                 with spent.on("contacts and blocking"):
                     problem = made(family.problem, assembly, options=named, whose=family.name)
         except OutOfTime:
-            say(f"The budget of {search.seconds:g} seconds ended before there was a problem to search: {spent}.")
+            say(f"The budget of {search.seconds:g} s (--seconds) ended before there was a problem to search: {spent}.")
             raise typer.Exit(Status.OUT_OF_BUDGET.exit_code) from None
         source = {"assembly": reference(path, files.reading(), assembly)}
         options = options | {"stability": problem.details["stability"]}

@@ -76,7 +76,7 @@ def render(
     staging, title = _staging(what, plan, number, files, {"collapse": collapse, **common.family_options(option)})
     if exploded is not None:
         picture = exploded_view(staging, spread=spread, size=still_size, camera=camera, title=title)
-        print(f"{still(picture, exploded)}: {title}, {len(staging.assembly)} parts pulled apart.")
+        print(f"{still(picture, exploded)}: {title}, {len(staging.shown)} parts pulled apart.")
     if out is not None:
         with common.progress_bar("pictures") as progress:
             film = frames(staging, title=title, size=film_size, camera=camera, progress=progress)

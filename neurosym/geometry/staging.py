@@ -49,6 +49,12 @@ class Staging:
             if name not in known:
                 raise UnknownNameError("part", name, known)
 
+    @property
+    def shown(self) -> tuple[str, ...]:
+        """Names of the parts that are there at any time, in the assembly's order."""
+        ever = set(self.present).union(*(motion.parts for motion in self.motions))
+        return tuple(name for name in self.assembly.names if name in ever)
+
     def there(self, step: int) -> tuple[str, ...]:
         """Names of the parts in place before step number `step` (from 0), in the assembly's order."""
         now = set(self.present)
