@@ -16,6 +16,8 @@ from neurosym.support.arrays import Array, Pixels
 
 #: Gap between the bounds of exploded parts, as a share of the median part's extent.
 GAP = 0.35
+#: More parts than this have no numbers: they would cover what they number.
+MOST_NUMBERED = 150
 #: How far parts go without a plan, at a spread of one: so many times their way from the middle.
 RADIAL = 0.9
 
@@ -70,7 +72,8 @@ def exploded_view(
     Args:
         size: width and height in pixels, without the words below.
         camera: from which side; None takes `best_camera`.
-        names: whether each part's name is written on it (unless they bear pictures), or its number, with a list beside.
+        names: whether each part's name is written on it (unless they bear pictures), or its number, with
+            a list beside (up to `MOST_NUMBERED` parts).
     """
     shifts = explode(staging, spread=spread)
     bounds = dict(zip(staging.assembly.names, staging.assembly.part_bounds))
@@ -86,7 +89,7 @@ def exploded_view(
         tops=staging.tops,
     ) as film:
         picture = film.picture(tuple(shifts), where)
-        if names and not staging.tops:
+        if names and not staging.tops and len(shifts) <= MOST_NUMBERED:
             picture = label(picture, film.seen_at(tuple(shifts), where), tuple(shifts))
     count = len(shifts)
     return captioned(picture, title or "exploded view", note=f"{count} part{'s' if count != 1 else ''}")
@@ -95,7 +98,7 @@ def exploded_view(
 def _directions(staging: Staging) -> dict[str, Array]:
     """Part -> unit vector of its way out, where that is straight, or at least ends somewhere else."""
     found: dict[str, Array] = {}
-    for motion in staging.motions:
+    for motion in (m for m in staging.motions if m.tracks):
         end, centre = motion.tracks[0].poses[-1], motion.tracks[0].centre
         way = end[:3, :3] @ centre + end[:3, 3] - centre
         length = float(np.linalg.norm(way))

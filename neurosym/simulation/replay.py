@@ -171,6 +171,10 @@ class _Run:
         """Do one step, and let the rest settle."""
         world, action, motion = self.world, self._staging.plan[number], self._staging.motions[number]
         there = {part for part, _ in world.there}
+        if not motion.parts:
+            before = world.poses()
+            world.settle(watch=self._show)
+            return self._judged(action, motion, before, ())
         if motion.arrives:
             later = self._staging.motions[number + 1 :]
             if any(other.arrives and set(motion.parts) & set(other.parts) for other in later):

@@ -177,7 +177,10 @@ class PlanScene:
             self._path.remove()
             self._path = None
         if step is not None:
-            path = self._to_scene(timeline.path_of(step))
+            path = timeline.path_of(step)
+            if not len(path):
+                return  # it moves nothing
+            path = self._to_scene(path)
             pieces = np.stack([path[:-1], path[1:]], axis=1)
             self._path = self.server.scene.add_line_segments("/parts/way", pieces, _PICKED, thickness=0.008 * SIZE)
 
