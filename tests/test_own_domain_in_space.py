@@ -2,6 +2,9 @@
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 
 import neurosym as ns
 from neurosym.cli import main
@@ -11,6 +14,7 @@ from neurosym.simulation.animation import frames
 from neurosym.simulation.captions import label
 from neurosym.simulation.exploded import explode, exploded_view
 from neurosym.simulation.storyboard import describe
+from neurosym.viewer.scene import FIELD_OF_VIEW, MARGIN, camera_for
 from neurosym.viewer.timeline import Timeline
 
 part, tool = ns.Type("part"), ns.Type("tool")
@@ -137,3 +141,20 @@ def test_a_hidden_part_is_in_the_list():
     seen = {"front": (100.0, 100.0, 50.0)}
     assert label(picture, seen).shape == picture.shape
     assert label(picture, seen, ("front", "behind")).shape[1] > picture.shape[1]
+
+
+@given(arrays(np.float64, (9, 3), elements=st.floats(-5, 5)))
+@settings(max_examples=50, deadline=None)
+def test_the_camera_sees_every_point_and_stands_no_farther_than_it_must(points):
+    points = points + np.linspace(0, 1, 9)[:, None]  # never all in one place
+    eye, target = camera_for(points)
+    back = (eye - target) / np.linalg.norm(eye - target)
+    right = np.cross([0, 0, 1], back) / np.linalg.norm(np.cross([0, 0, 1], back))
+    axes = np.stack([right, np.cross(back, right), back], axis=1)
+
+    def widest(at):
+        seen = (points - at) @ axes
+        return (np.abs(seen[:, :2]) / -seen[:, 2:]).max()
+
+    window = np.tan(FIELD_OF_VIEW / 2)
+    assert widest(eye) * MARGIN == pytest.approx(window, rel=1e-6)

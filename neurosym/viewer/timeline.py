@@ -117,6 +117,11 @@ class Timeline:
 
     def bounds(self) -> Array:
         """float64 (2, 3): bounds of what is to be seen at whole times, and at the outer ends of all paths."""
+        boxes = self.boxes()
+        return np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
+
+    def boxes(self) -> Array:
+        """float64 (k, 2, 3): bounds of each part wherever it is to be seen at those times."""
         boxes = self.bounds_at_rest[None] + self.shifts[:, :, None]
         seen = [boxes[self.where != ABSENT] if self.where.any() else self.bounds_at_rest]
         for number, (motion, movers) in enumerate(zip(self._motions, self._movers)):
@@ -125,8 +130,7 @@ class Timeline:
             middle, end = self._middle(number), motion.tracks[0].poses[-1]
             shift = end[:3, :3] @ middle + end[:3, 3] - middle
             seen.append(self.bounds_at_rest[movers] + self._base(number) + shift)
-        all_seen = np.concatenate(seen)
-        return np.stack([all_seen[:, 0].min(axis=0), all_seen[:, 1].max(axis=0)])
+        return np.concatenate(seen)
 
     def path_of(self, step: int) -> Array:
         """float64 (k, 3): the path of the middle of what moves in a step, out from where it rests."""
