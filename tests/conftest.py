@@ -8,16 +8,14 @@ from neurosym.geometry.readers import loading
 
 @pytest.fixture(autouse=True)
 def nothing_kept(monkeypatch):
-    monkeypatch.setattr(kept_tables, "WORTH", float("inf"))
-    monkeypatch.setattr(loading, "SLOW", float("inf"))
-    monkeypatch.setattr(loading.kept, "ALONE", ())
+    monkeypatch.setenv("NEUROSYM_KEEP", "0")
 
 
 @pytest.fixture
 def everything_kept(nothing_kept, monkeypatch, tmp_path):
     """All that is read and tabulated is kept in a folder of this test; the folder."""
+    monkeypatch.setenv("NEUROSYM_KEEP", "1")
     monkeypatch.setenv("NEUROSYM_CACHE", str(tmp_path / "cache"))
     monkeypatch.setattr(kept_tables, "WORTH", 0)
     monkeypatch.setattr(loading, "SLOW", 0.0)
-    monkeypatch.setattr(loading.kept, "ALONE", (".glb", ".stl"))
     return tmp_path / "cache"

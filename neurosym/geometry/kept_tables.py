@@ -23,7 +23,7 @@ WORTH = 2_000
 def place_of(assembly: Assembly, what: str, directions: Array | None = None) -> Path | None:
     """Where a table of an assembly is kept; None: it is too small for that."""
     shapes = [body.shape for body in assembly.bodies]
-    if sum(len(shape.faces) for shape in shapes) < WORTH:
+    if sum(len(shape.faces) for shape in shapes) < WORTH or not disk_cache.keeps_geometry():
         return None
     data = repr((assembly.tolerances, assembly.table, assembly.owners.tolist())).encode()
     arrays = [assembly.X_WB, *(array for shape in shapes for array in (shape.vertices, shape.faces))]

@@ -40,6 +40,11 @@ def _code() -> bytes:
     return digest.digest()
 
 
+def keeps_geometry() -> bool:
+    """Whether what is read and tabulated is kept: unless the environment's ``NEUROSYM_KEEP`` is 0, as in benchmarks."""
+    return os.environ.get("NEUROSYM_KEEP") != "0"
+
+
 def place(what: str, *content: bytes) -> Path:
     """Where arrays that geometry makes of this content are kept, with this code."""
     digest = hashlib.sha256(_code())

@@ -32,6 +32,8 @@ _KINDS = {"box": Box, "convex": Convex, "mesh": Mesh}
 
 def place_of(source: Path, options: object) -> Path | None:
     """Where the assembly of these files, read with these options, is kept; None: it is not to be."""
+    if not disk_cache.keeps_geometry():
+        return None
     try:
         files = sorted(_files(source))
         if not files or any(file.is_symlink() for file in files) or sum(f.stat().st_size for f in files) > LARGEST:
