@@ -22,6 +22,7 @@ from neurosym.language.search_problem import RelaxedPlan, Verdict
 from neurosym.language.semantics import Semantics
 from neurosym.language.state import BitState
 from neurosym.language.terms import Literal
+from neurosym.language.travel import remade
 from neurosym.support.words import listed
 
 if TYPE_CHECKING:
@@ -118,6 +119,7 @@ class RemovalSemantics(Semantics):
         return covering(problem, self.setting, why)
 
 
+@remade
 def can_leave(setting: Setting) -> Derived:
     """``free(p)``: part p can leave, along a straight line or else, if paths are asked for, along a path."""
     straight = predicates.free(present, directions=setting.directions)
@@ -140,6 +142,7 @@ def can_leave(setting: Setting) -> Derived:
     return Derived("free", [part], ask, check=check, formula=straight.formula if setting.paths == "straight" else None)
 
 
+@remade
 def need_not_separate(assembly: Assembly) -> Derived:
     """``need_not_separate()``: nothing but fixed parts is left, or all that is left is within one piece group."""
 
@@ -152,6 +155,7 @@ def need_not_separate(assembly: Assembly) -> Derived:
     return Derived("need_not_separate", [], ask)
 
 
+@remade
 def stands_at_first(setting: Setting) -> Derived:
     """``stands()``: the whole stands before anything is taken out. Afterwards each removal has seen to it."""
 

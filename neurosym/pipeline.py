@@ -21,6 +21,7 @@ from neurosym.planning.prior import Prior
 from neurosym.planning.result import OrderCount, PlanResult, Status
 from neurosym.planning.validation import confirm, replay, validate
 from neurosym.registry import load_planner, load_prior
+from neurosym.support.arrays import Array
 from neurosym.support.deadline import OutOfTime, within
 
 #: Seconds beyond the budget for looking over what came out of it: a plan's replay, or why there is none.
@@ -90,7 +91,8 @@ def plans(
             side = side_of(problem, searcher, side, alone=k is None and by_geometry)
             scores = advice(problem, prior)
             if by_geometry and (why_not := problem.semantics.refute(problem)) is not None:
-                none = PlanResult(Status.UNSOLVABLE, None, 0, 0, 0, spent(), why_not=why_not)
+                known: dict[str, Any] = {"why_not": why_not, "n_actions": len(problem.actions)}
+                none = PlanResult(Status.UNSOLVABLE, None, 0, 0, 0, spent(), **known)
                 return [none] if k is None else []
             with open_oracle(problem, oracle) as search:
                 asked: dict[str, Any] = {"k": k, "budget": budget.less(spent()), "rng": generator, "oracle": oracle}
@@ -145,7 +147,8 @@ def _with_grace(budget: Budget | None) -> float | None:
 
 
 def _bounded(search: SearchProblem[Any], result: PlanResult) -> PlanResult:
-    """The result with whether it has the fewest actions, where the problem has a bound on them."""
+    """The result with how many actions there are, and whether it has the fewest, where the problem has a bound."""
+    result = replace(result, n_actions=len(search.actions))
     known: RelaxedPlan | None = search.relaxed_plan(search.initial) if hasattr(search, "relaxed_plan") else None
     if result.plan is None or known is None:
         return result
@@ -185,6 +188,14 @@ def count_plans(problem: Problem) -> int:
     orders = _counter().count_orders(problem.ground()).orders
     assert orders is not None  # no budget could end it
     return orders
+
+
+def order_marginals(problem: Problem) -> Array:
+    """float64 (N, N): in what share of all orders that solve a problem action j is step i; exact, rows sum to 1.
+
+    Labels for training: a network that is shown single orders learns their accidents by heart.
+    """
+    return _counter().order_marginals(problem.ground())
 
 
 def count_orders(problem: Problem, *, budget: Budget | None = None) -> OrderCount:

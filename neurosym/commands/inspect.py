@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -17,6 +18,7 @@ from neurosym.commands.common import (
     problem_at,
     progress_bar,
 )
+from neurosym.commands.spent import Spent
 from neurosym.errors import InputError
 from neurosym.support.words import counted as numbered
 from neurosym.support.words import joined
@@ -73,15 +75,21 @@ def count(
     """
     from neurosym.pipeline import count_orders
     from neurosym.planning.budget import Budget
-    from neurosym.planning.result import Status
+    from neurosym.planning.result import OrderCount, Status
+    from neurosym.support.deadline import OutOfTime, within
 
-    problem = problem_at(path, files, removal.given())
-    with progress_bar(f"counting orders of {problem.name}", after=1.0):
-        counted = count_orders(problem, budget=Budget(seconds=seconds, expansions=expansions))
+    spent, counted = Spent(), OrderCount(None, False, 0, 0.0)
+    with contextlib.suppress(OutOfTime), within(seconds):
+        with spent.on("reading and geometry"):
+            problem = problem_at(path, files, removal.given())
+        with progress_bar(f"counting orders of {problem.name}", after=1.0), spent.on("counting"):
+            budget = Budget(seconds=seconds, expansions=expansions).less(spent.seconds)
+            counted = count_orders(problem, budget=budget)
+    counted = replace(counted, seconds=spent.seconds)
     if as_json:
         print_json({"path": str(path), **counted.as_json()})
     elif counted.orders is None:
-        looked = f"{numbered(counted.states, 'state')} in {counted.seconds:.1f} s"
+        looked = f"{numbered(counted.states, 'state')} in {spent}"
         print(f"The budget ended after {looked}, so there is no number. Give more: --seconds, --expansions.")
     else:
         least = "" if counted.exact else "At least "

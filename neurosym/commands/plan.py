@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
-from time import perf_counter
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
@@ -25,6 +25,7 @@ from neurosym.commands.common import (
     write_json,
 )
 from neurosym.commands.plan_text import show
+from neurosym.commands.spent import Spent
 from neurosym.commands.widening import widened
 from neurosym.errors import InputError
 from neurosym.language.options import made
@@ -86,8 +87,8 @@ def plan(
     from neurosym.planning.sturdiness import SturdyPlan, sturdiest_plan
     from neurosym.registry import load_domain
 
-    start = perf_counter()
     assembly: Assembly | None = None
+    spent = Spent()
     cells = search.own_cells()
     path = _path(what, number, cells)
     family = load_domain("assembly" if path else what)
@@ -103,11 +104,13 @@ def plan(
     else:
         try:
             with within(search.seconds):
-                assembly = load_assembly(path, files)
+                with spent.on("reading"):
+                    assembly = load_assembly(path, files)
                 named = options | {"name": path.resolve().name}
-                problem = made(family.problem, assembly, options=named, whose=family.name)
+                with spent.on("contacts and blocking"):
+                    problem = made(family.problem, assembly, options=named, whose=family.name)
         except OutOfTime:
-            say(f"The budget of {search.seconds:g} seconds ended while {path} was read. Give more: --seconds.")
+            say(f"The budget of {search.seconds:g} s (--seconds) ended before there was a problem to search: {spent}.")
             raise typer.Exit(Status.OUT_OF_BUDGET.exit_code) from None
         source = {"assembly": reference(path, files.reading(), assembly), "notes": [str(n) for n in assembly.notes]}
         options = options | {"stability": problem.details["stability"]}
@@ -122,11 +125,11 @@ def plan(
         "oracle": search.oracle,
         "side": side,
     }
-    settings["budget"] = budget.less(perf_counter() - start)
+    settings["budget"] = budget.less(spent.seconds)
     sturdiest: SturdyPlan | None = None
     if sturdy and (path is None or k is not None or removal.tilt is not None):
         raise InputError("Expected --sturdy with the path of an assembly, and without --k and --tilt.")
-    with progress_bar(f"planning {problem.name}", after=1.0):
+    with progress_bar(f"planning {problem.name}", after=1.0), spent.on("planning"):
         if sturdy:
             sturdiest = sturdiest_plan(
                 lambda tilt: made(family.problem, assembly, options=named | {"tilt": tilt}, whose=family.name),
@@ -137,8 +140,10 @@ def plan(
             results = plans(problem, k=k, rng=np.random.default_rng(search.seed), **settings)
         if not results:
             # The k best of none: ask for one, to be told why there is none.
-            settings["budget"] = budget.less(perf_counter() - start)
+            settings["budget"] = budget.less(spent.seconds)
             results = [solve(problem, rng=np.random.default_rng(search.seed), **settings)]
+    # What a user waits for, reading and geometry included.
+    results = [replace(result, seconds=spent.seconds) for result in results]
     answer = {
         **problem_part(family.name, problem, number, options),
         **source,
@@ -149,8 +154,8 @@ def plan(
         **({"sturdy": sturdiest.as_json()} if sturdiest else {}),
     }
     if results[0].why_not is not None and assembly is not None:
-        left = None if search.seconds is None else search.seconds - (perf_counter() - start)
-        with progress_bar("looking for what would help", after=1.0):
+        left = None if search.seconds is None else search.seconds - spent.seconds
+        with progress_bar("looking for what would help", after=1.0), spent.on("what would help"):
             answer["widened"] = widened(family, assembly, named | options, results[0].why_not, settings, left)
     if k is not None:
         answer["plans"] = [result_part(result) for result in results]
@@ -162,6 +167,8 @@ def plan(
         show(problem, results, answer)
         if sturdiest:
             print(sturdiest.sentence)
+        if results[0].status is Status.OUT_OF_BUDGET and search.seconds is not None:
+            print(f"Spent: {spent}.")
     raise typer.Exit(results[0].status.exit_code)
 
 

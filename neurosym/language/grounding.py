@@ -120,7 +120,9 @@ class GroundProblem:
                 stated = _as_motion(predicate, verdict.motion)
                 motion = stated if motion is None else motion.joined(stated)
         if motion is not None:
-            parts, arrive = moved_parts(self._effects[action], getattr(self.world, "names", ()))
+            parts, arrive = moved_parts(
+                self._effects[action], getattr(self.world, "names", ()), self.problem.domain.presence
+            )
             motion = motion.of_parts(parts, arrive=arrive)
         return None, motion
 

@@ -24,10 +24,12 @@ from neurosym.language import formulas
 from neurosym.language.search_problem import Verdict
 from neurosym.language.state import State
 from neurosym.language.terms import Atom, Derived, Fluent, Literal, Type
+from neurosym.language.travel import remade
 from neurosym.support.bitsets import bits
 from neurosym.support.words import listed
 
 
+@remade
 def free(present: Fluent, *, directions: ArrayLike | None = None, table: bool = True, removal: bool = True) -> Derived:
     """``free(p)``: part p can leave by one straight translation, past the parts present and the table.
 
@@ -77,6 +79,7 @@ def free(present: Fluent, *, directions: ArrayLike | None = None, table: bool = 
     return Derived("free", [part], ask, formula=formula)
 
 
+@remade
 def interlocked(present: Fluent, *, directions: ArrayLike | None = None, table: bool = True) -> Derived:
     """``interlocked()``: no single part of those present is free (they may still come apart in groups)."""
     one = free(present, directions=directions, table=table).function
@@ -92,6 +95,7 @@ def interlocked(present: Fluent, *, directions: ArrayLike | None = None, table: 
     return Derived("interlocked", [], ask)
 
 
+@remade
 def supported(present: Fluent, *, removal: bool = True) -> Derived:
     """``supported(p)``: something under part p, a part present or the table, touches it from below."""
     part = _part_type(present)
@@ -118,6 +122,7 @@ def supported(present: Fluent, *, removal: bool = True) -> Derived:
     return Derived("supported", [part], ask, formula=formula)
 
 
+@remade
 def stable_without(present: Fluent, *, removal: bool = True, held: int = 0) -> Derived:
     """``stable_without(p)``: the parts present other than p stand still under gravity, friction included.
 
@@ -150,6 +155,7 @@ def stable_without(present: Fluent, *, removal: bool = True, held: int = 0) -> D
     return Derived("stable_without", [part], ask, check=check, formula=formula, after=stands_there(present, held))
 
 
+@remade
 def stands_there(present: Fluent, held: int = 0) -> Derived:
     """``stands_there()``: the parts present stand still under gravity, `held` of them held at the most."""
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import ConvexHull
 
 from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.contact.surfaces import FACETS, BodySurfaces, Surfaces
@@ -75,6 +74,8 @@ def _hull(assembly: Assembly, surfaces: Surfaces, body: int) -> tuple[Array, Arr
     """Planes of the facets of a body's convex hull, float64 (m, 4): n . x + w <= 0 inside; and its corners, (k, 3)."""
     vertices = surfaces.vertices[surfaces.first_vertex[body] : surfaces.first_vertex[body + 1]]
     if not assembly.bodies.is_convex[body]:
+        from scipy.spatial import ConvexHull
+
         hull = ConvexHull(vertices)
         return hull.equations, vertices[hull.vertices]
     own = slice(surfaces.first[body], surfaces.first[body + 1])

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from neurosym.geometry.contact.surfaces import BodySurfaces
 from neurosym.geometry.keeping import keep_together
 from neurosym.geometry.mesh import triangles
 from neurosym.geometry.notes import FaultyPartsError, Note
+from neurosym.geometry.readers import kept
 from neurosym.geometry.readers.assembly_json import read_json
 from neurosym.geometry.readers.burrtools import read_xmpuzzle
 from neurosym.geometry.readers.clearances import with_clearances
@@ -43,6 +45,9 @@ from neurosym.geometry.tolerances import DEFAULT_TOLERANCES, Tolerances
 from neurosym.geometry.units import unit
 from neurosym.support.deadline import check
 from neurosym.support.progress import Progress, silent
+
+#: Seconds that reading must take for what was read to be kept.
+SLOW = 0.2
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -123,6 +128,10 @@ def load(
     source, options = Path(path), Options(up=up, problem=problem, solution=solution, meshes=meshes, joints=joints)
     if options.up not in (None, "y", "z"):
         raise InputError(f'Expected up as "y", "z" or None; got {options.up!r}.')
+    fixed, start = tuple(fixed), perf_counter()
+    place = kept.place_of(source, (units, fixed, tolerances, friction, options))
+    if place is not None and (known := kept.load(place)) is not None:
+        return known
     contents = _read(source, options)
     contents, notes = in_units(contents, None if units is None else unit(units), source)
     if contents.separate:
@@ -144,7 +153,10 @@ def load(
             **{name: tuple(names[n] for n in numbers) for name, (_, numbers) in zip(called, nested)},
         },
     )
-    return _checked(contents, str(source), progress)
+    assembly = _checked(contents, str(source), progress)
+    if place is not None and perf_counter() - start > SLOW:
+        kept.store(place, assembly)
+    return assembly
 
 
 def from_meshes(
