@@ -8,8 +8,8 @@ import trimesh
 
 import neurosym as ns
 from neurosym.cli import main
-from neurosym.commands.plan_text import _when
 from neurosym.language.search_problem import Rejection
+from neurosym.planning.result_text import _when
 
 assembly = ns.load_domain("assembly")
 CHAIN = {"ring": [(x, y, 2) for x in range(5) for y in range(5) if x in (0, 4) or y in (0, 4)],
