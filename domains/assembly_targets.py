@@ -11,7 +11,7 @@ from __future__ import annotations
 import heapq
 from collections.abc import Iterable
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from neurosym.geometry.queries import AssemblyGeometry
 from neurosym.support.bitsets import bits
@@ -38,6 +38,10 @@ class Relaxation:
     ) -> None:
         self.geometry, self.setting, self.targets, self.before = geometry, setting, targets, tuple(before)
         self._known: dict[int, tuple[int, tuple[int, ...]]] = {}
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copies sent to other processes leave the answers behind."""
+        return Relaxation, (self.geometry, self.setting, self.targets, self.before)
 
     @cached_property
     def _ways(self) -> list[list[int]]:
