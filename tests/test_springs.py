@@ -18,6 +18,7 @@ from neurosym.geometry.queries import AssemblyGeometry
 from neurosym.geometry.shapes import Body, Box, Part
 from neurosym.geometry.stability.contact_springs import contact_springs
 from neurosym.geometry.stability.of_assembly import spring_stability as with_contacts
+from neurosym.geometry.stability.patches import groups
 from neurosym.geometry.stability.settling import settle
 from neurosym.geometry.stability.spring_loads import drag, margin, standing_while_pulled
 from neurosym.geometry.stability.spring_stability import SpringStability
@@ -209,7 +210,7 @@ def test_groups_are_judged_by_themselves():
     cells = {f"{k}-{z}": [(3 * k, 0, z)] for k in range(6) for z in range(3)}
     world = ns.Assembly.from_cells(cells)
     stability = spring_stability(world)
-    assert len(stability.groups(everything(world))) == 6
+    assert len(groups(everything(world), stability.touching)) == 6
     floating = everything(world) & ~world.mask(["2-0"])
     assert stability.standing(floating).moving == world.mask(["2-1"])
     assert stability.standing(floating & ~world.mask(["2-1", "2-2", "0-2"])).stands

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import functools
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from neurosym.geometry.contact.planes import hull_points
 from neurosym.geometry.mesh.topology import volume_and_centre
 from neurosym.geometry.shapes import Box
 from neurosym.support.arrays import Array
+from neurosym.support.bitsets import bits
 
 #: A part is under another when the normal between them points down by more (45 degrees).
 UNDER = 0.7
@@ -84,3 +86,17 @@ def neighbours(patches: Iterable[Contact], n: int) -> tuple[list[int], list[int]
         elif p.normal[2] > UNDER:
             supports[p.b] |= 1 << p.a
     return touching, supports, on_table
+
+
+def groups(movable: int, touching: Sequence[int]) -> list[int]:
+    """Bitsets of the movable parts, themselves a bitset, that hang together by contacts."""
+    found = []
+    while movable:
+        group = fresh = movable & -movable
+        while fresh:
+            near = functools.reduce(int.__or__, (touching[p] for p in bits(fresh)), 0)
+            fresh = near & movable & ~group
+            group |= fresh
+        found.append(group)
+        movable &= ~group
+    return found

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from neurosym.geometry.stability.patches import groups
 from neurosym.geometry.stability.spring_stability import SpringStability
 from neurosym.geometry.stability.spring_verdicts import SpringStanding, moving_parts
 from neurosym.geometry.stability.springs import tilted
@@ -65,7 +66,7 @@ def standing_while_pulled(
     where they would fall by that, whoever draws them holds them. Only what hangs together with them is looked at.
     """
     movable = subset & ~held & ~stability.fixed
-    near = sum(group for group in stability.groups(movable) if group & leaving)
+    near = sum(group for group in groups(movable, stability.touching) if group & leaving)
     around = stability.next_to(near) & subset & ~movable
     loads = drag(stability, near | around, leaving, direction, around)
     there = near | around

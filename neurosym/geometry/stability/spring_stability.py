@@ -13,7 +13,7 @@ from neurosym.geometry.stability.contact_springs import contact_springs
 from neurosym.geometry.stability.equilibrium import LIGHTEST
 from neurosym.geometry.stability.holding import parts_to_hold
 from neurosym.geometry.stability.load_paths import LEVEL, LoadPaths
-from neurosym.geometry.stability.patches import neighbours
+from neurosym.geometry.stability.patches import groups, neighbours
 from neurosym.geometry.stability.settling import Settled, settle
 from neurosym.geometry.stability.spring_verdicts import (
     ContactForces,
@@ -109,7 +109,7 @@ class SpringStability:
         if self._paths is not None and not len(self._tilts) and self._paths.carry(subset, movable):
             self.asked["load paths"] += 1
             return SpringStanding(True, 0, held)
-        for group in self.groups(movable):
+        for group in groups(movable, self.touching):
             answer = self._group(group, self.next_to(group) & subset & ~movable)
             if not answer.stands:
                 return replace(answer, held=held)
@@ -142,24 +142,12 @@ class SpringStability:
         movable = subset & ~self.fixed
         return SpringStanding(False, moving, 0, not promises, self._carried_by(moving, movable, subset))
 
-    def groups(self, movable: int) -> list[int]:
-        """Bitsets of movable parts that hang together by contacts."""
-        found = []
-        while movable:
-            group = fresh = movable & -movable
-            while fresh:
-                fresh = self.next_to(fresh) & movable & ~group
-                group |= fresh
-            found.append(group)
-            movable &= ~group
-        return found
-
     # -- evidence ---------------------------------------------------------------------------------------------
 
     def movements(self, subset: int, held: int = 0) -> tuple[Movement, ...]:
         """How parts of a subset begin to fall, the one that falls most first; none if it stands."""
         movable = subset & ~held & ~self.fixed
-        for group in self.groups(movable):
+        for group in groups(movable, self.touching):
             around = self.next_to(group) & subset & ~movable
             answer = self._group(group, around)
             if answer.stands:
@@ -236,7 +224,7 @@ class SpringStability:
             self.asked["pushes"] += 1
             return SpringStanding(True)
         light, light_stand = self._light(group), True
-        for few in self.groups(light):
+        for few in groups(light, self.touching):
             answer = self._group(few, self.next_to(few) & there & ~light)
             if not answer.stands and answer.promises:
                 return SpringStanding(False, answer.moving, balanced=False)

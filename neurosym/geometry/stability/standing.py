@@ -27,7 +27,7 @@ from neurosym.geometry.contact.contacts import TABLE, Contact
 from neurosym.geometry.stability.equilibrium import BALANCE, CONE_EDGES, LIGHTEST, QUICK, THOROUGH, Balance, Equilibrium
 from neurosym.geometry.stability.holding import Standing, parts_to_hold
 from neurosym.geometry.stability.linear_program import solve_program
-from neurosym.geometry.stability.patches import masses, merged_patches, neighbours
+from neurosym.geometry.stability.patches import groups, masses, merged_patches, neighbours
 from neurosym.support.arrays import Array, Numbers, Truths
 from neurosym.support.bitsets import bits
 from neurosym.support.deadline import check
@@ -124,8 +124,6 @@ class Stability:
     def by_program(self, subset: int, held: int = 0) -> Standing:
         """The same question put to a linear program over all contacts at once: slow, and the last word."""
         question = self._question(subset, subset & ~held & ~self.assembly.fixed_mask)
-        if not len(question.parts):
-            return Standing(True, 0, held)
         balance = solve_program(self.equilibrium, question.parts, question.corners, self.assembly.in_mask(subset))
         return Standing(True, 0, held) if balance.stands else self._fallen(question, balance, held)
 
@@ -145,25 +143,12 @@ class Stability:
     def _answer(self, subset: int, held: int) -> Standing:
         movable = subset & ~held & ~self.assembly.fixed_mask
         moving = 0
-        for group in self.groups(movable):
+        for group in groups(movable, self.touching):
             around = functools.reduce(int.__or__, (self.touching[p] for p in bits(group)), 0) & subset & ~group
             if group | around == subset:
                 return self._judge(subset, movable, held)
             moving |= self.standing(group | around, around).moving
         return Standing(not moving, moving, held)
-
-    def groups(self, movable: int) -> list[int]:
-        """Bitsets of movable parts that hang together by contacts."""
-        found = []
-        while movable:
-            group = fresh = movable & -movable
-            while fresh:
-                near = functools.reduce(int.__or__, (self.touching[p] for p in bits(fresh)), 0)
-                fresh = near & movable & ~group
-                group |= fresh
-            found.append(group)
-            movable &= ~group
-        return found
 
     def _judge(self, subset: int, movable: int, held: int) -> Standing:
         """The answer for movable parts that hang together, with all that touches them."""
@@ -176,8 +161,6 @@ class Stability:
             if not alone.stands or not movable & ~self.light:
                 return Standing(alone.stands, alone.moving, held)
         question = self._question(subset, movable)
-        if not len(question.parts):
-            return Standing(True, 0, held)
         start = self._similar(subset, held) if len(question.parts) > SMALL else None
         if start is not None:
             answer = self._near(question, start, held)
