@@ -12,6 +12,8 @@ import torch
 from numpy.typing import ArrayLike, NDArray
 
 from learned_priors.checkpoints import save_network
+from learned_priors.learner import calibrate
+from learned_priors.losses import targets_of
 from learned_priors.recipes import Recipe, recipe_named
 from learned_priors.train_config import TrainConfig
 from learned_priors.trained_network import TrainedNetwork
@@ -194,6 +196,22 @@ class NetworkPrior(Prior):
         }
         classes = {"classes": list(demonstrations.classes)} if demonstrations.classes else {}
         self._weights.own = TrainedNetwork(network, {**header, **classes})
+        return self
+
+    def calibrate(self, demonstrations: Demonstrations) -> Self:
+        """Set how sure the scores are by demonstrations that were not learned from. Returns itself.
+
+        The logits are divided by the temperature of the least cross-entropy (Guo et al., ICML 2017); which order is the
+        likeliest hardly changes. The temperature is in the header that `save` writes.
+        """
+        own = self._weights.own
+        if own is None:
+            raise InputError("Expected a prior that was trained, or given weights; this one has none. Call fit first.")
+        marginals = None if demonstrations.marginals is None else torch.from_numpy(demonstrations.marginals)
+        target = targets_of(torch.from_numpy(demonstrations.sequences), own.network.config.n_actions, marginals)
+        calibrate(own.network, demonstrations.pictures, target.to(self.device), own.classes)
+        header = {**own.header, "network": own.network.config.to_json()}
+        self._weights.own = TrainedNetwork(own.network, header)
         return self
 
     def save(self, path: str | Path, *, notes: Mapping[str, Any] | None = None) -> Path:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from neurosym.commands import common
-from neurosym.errors import InputError
+from neurosym.errors import InputError, UnknownNameError
 
 if TYPE_CHECKING:
     from neurosym.language.demonstrations import Demonstrations
@@ -44,7 +44,16 @@ def train(
     ] = None,
     split: common.Split = 0,
     seed: Annotated[int, typer.Option(min=0, metavar="K", help="Of the pictures and the training.")] = 0,
-    pictures: common.PictureStyle = "clean",
+    pictures: Annotated[
+        list[common.PictureStyles] | None, typer.Option(help="Style of the pictures; may be repeated. Default clean.")
+    ] = None,
+    part: Annotated[
+        str,
+        typer.Option(metavar="train|learn", help="learn: a sixth of train is kept, and says how sure to be of scores."),
+    ] = "train",
+    augment: Annotated[
+        float | None, typer.Option(min=0, max=1, help="How much pictures change at every update. Default the recipe's.")
+    ] = None,
     epochs: Annotated[int | None, typer.Option(min=1, help="Default the recipe's.")] = None,
     encoder: Annotated[
         str | None, typer.Option(metavar="NAME", help="small (default) or paper, the paper's CNN.")
@@ -58,8 +67,11 @@ def train(
 
     _check_suffix(out, ".safetensors")
     load_domain(domain)
-    if demos_file is not None and (split or option or pictures != "clean"):
-        raise InputError("Expected --split, --pictures and --option only without --demos, whose file has it all.")
+    if demos_file is not None and (split or option or pictures or part != "train"):
+        raise InputError("Expected --split, --pictures, --part, --option only without --demos, whose file has it all.")
+    if part not in ("train", "learn"):
+        raise UnknownNameError("part to learn from", part, ("train", "learn"))
+    styles: list[Any] = [style.value for style in pictures or ()] or ["clean"]
     learner: Any = load_prior(prior, **({"encoder": encoder} if encoder else {}))
     if not (hasattr(learner, "fit") and hasattr(learner, "save")):
         raise InputError(f"Expected a prior that can be trained; {prior!r} cannot (it has no fit and save).")
@@ -69,15 +81,25 @@ def train(
         given = Demonstrations.load(demos_file)
     else:
         recipe = getattr(learner, "labels", "full")
-        given = _demonstrations(domain, "train", split, recipe, pictures, seed, common.family_options(option))
+        options = common.family_options(option)
+
+        def shown(part: str) -> Demonstrations:
+            parts = [_demonstrations(domain, part, split, recipe, style, seed, options) for style in styles]
+            return type(parts[0]).joined(parts)
+
+        given = shown(part)
     checkpoint = out.with_suffix(".checkpoint")
     if checkpoint.exists():
         common.say(f"Going on from {checkpoint}." if resume else f"Starting over; {checkpoint} is replaced.")
     out.parent.mkdir(parents=True, exist_ok=True)
     with warnings.catch_warnings():
         warnings.showwarning = lambda message, *_, **__: common.say(f"Note: {message}")
-        _fit(learner, given, seed=seed, epochs=epochs, device=device, checkpoint=checkpoint, resume=resume)
-    made_here = {"split": split, "pictures": pictures, "seed": seed, **common.family_options(option)}
+        settings = {} if augment is None else {"settings": {"augment": augment}}
+        _fit(learner, given, seed=seed, epochs=epochs, device=device, checkpoint=checkpoint, resume=resume, **settings)
+    if part == "learn":
+        learner.calibrate(shown("choose"))
+    made_here = {"split": split, "part": part, "pictures": "+".join(styles), "seed": seed}
+    made_here |= common.family_options(option)
     learner.save(out, notes=made_here if demos_file is None else {"file": demos_file.name})
     checkpoint.unlink(missing_ok=True)
     figures = learner.header.get("training", {}) if hasattr(learner, "header") else {}
