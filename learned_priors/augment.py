@@ -16,6 +16,8 @@ from torch.nn import functional
 BRIGHTNESS, HUE, NOISE, SHIFT, ZOOM, ROTATION, OCCLUDER = math.log(2.2), 0.12, 12.0, 0.09, 0.12, 6.0, 0.14
 #: Chances that what is behind the work is replaced, that something hides a bit, that the picture is out of focus.
 BACKGROUND, HIDDEN, BLURRED = 0.5, 0.4, 0.3
+#: Chance that all views of a piece of work stay as they are.
+UNCHANGED = 0.3
 #: Chance that the work is not there at all: then what is right most often is learned, and to be no surer than that.
 NOTHING = 0.05
 #: Pixels this near to the mean of a picture's corners are behind the work (grey levels; the style `varied` has noise).
@@ -27,6 +29,13 @@ def augmented(pictures: Tensor, strength: float = 1.0) -> Tensor:
 
     Light is one for all views of a piece of work, cameras are moved each by itself.
     """
+    some = (torch.rand(len(pictures)) >= UNCHANGED).nonzero()[:, 0].to(pictures.device)
+    changed = pictures.clone()
+    changed[some] = _changed(pictures[some], strength)
+    return changed
+
+
+def _changed(pictures: Tensor, strength: float) -> Tensor:
     b, v, height, width, _ = pictures.shape
     x = pictures.flatten(0, 1).permute(0, 3, 1, 2).to(torch.float32).contiguous()
     x = _before_another(x, strength)

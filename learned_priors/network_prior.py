@@ -157,6 +157,7 @@ class NetworkPrior(Prior):
         resume: bool = True,
         config: TrainConfig | None = None,
         settings: Mapping[str, Any] | None = None,
+        start: str | Path | None = None,
     ) -> Self:
         """Train a network on demonstrations; this prior then reads with it. Returns itself.
 
@@ -170,6 +171,7 @@ class NetworkPrior(Prior):
             config: instead of the recipe's `TrainConfig`.
             settings: fields of the `TrainConfig` to change, ``{"epochs": 25, "rate": 4e-3}``; `epochs` goes before.
                 Besides, ``"head"`` and ``"width"`` of the network.
+            start: weights of this recipe, of the same actions, to go on from instead of chance ones.
         """
         if device is not None:
             self.device = self._weights.device = _checked_device(device)
@@ -177,6 +179,10 @@ class NetworkPrior(Prior):
             demonstrations, encoder=self.encoder or "small", epochs=epochs, config=config, settings=settings
         )
         kept = Path(checkpoint) if checkpoint else None
+        known = self._weights.load(Path(start)) if start else None
+        actions = list(demonstrations.actions)
+        if known and (known.header["actions"], known.network.config.shape) != (actions, given.shape):
+            raise InputError(f"Expected weights of the same network and actions to start from; {start} has others.")
         network, figures = fit(
             demonstrations,
             given,
@@ -186,6 +192,7 @@ class NetworkPrior(Prior):
             progress=progress,
             checkpoint=kept,
             resume=resume,
+            start=known.network if known else None,
         )
         header = {
             "prior": self.recipe.name,

@@ -4,7 +4,7 @@ where tasks differ in length, something that tells the number of steps."""
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
@@ -76,6 +76,11 @@ class NetworkConfig:
 
     def to_json(self) -> dict[str, Any]:
         return {**asdict(self), "picture_shape": list(self.picture_shape)}
+
+    @property
+    def shape(self) -> NetworkConfig:
+        """The same, but for what only reading takes: networks that agree in it have weights of the same shapes."""
+        return replace(self, temperature=1.0, iterations=None)
 
     @classmethod
     def from_json(cls, given: Mapping[str, Any]) -> NetworkConfig:

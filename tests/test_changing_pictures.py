@@ -11,10 +11,12 @@ import torch
 import neurosym as ns
 from learned_priors.augment import augmented
 from learned_priors.network_prior import NetworkPrior
+from neurosym.cli import main
 from neurosym.experiments import robustness
 from neurosym.experiments.perturbations import PERTURBATIONS, SOMETHING_ELSE
 from neurosym.geometry.assembly import Assembly
 from neurosym.language.demonstrations import Demonstrations
+from neurosym.planning.weights_header import read_header
 from neurosym.simulation.clutter import turned_hues
 from neurosym.simulation.looks import Camera, Clutter, Style
 from neurosym.simulation.render import render_views
@@ -118,6 +120,19 @@ def test_training_with_changes_reads_changed_light() -> None:
     assert (prior.predict(dark) == test.sequences).all(axis=1).mean() > 0.9
 
 
+def test_training_goes_on_from_weights(tmp_path: Path) -> None:
+    torch.set_num_threads(1)
+    test = stripes(60, 5.0, 1)
+    first = NetworkPrior("sinkhorn").fit(stripes(120, 5.0, 0), epochs=25, settings={"batch": 32})
+    path = first.save(tmp_path / "first.safetensors")
+    on = NetworkPrior("sinkhorn").fit(stripes(60, 5.0, 2), epochs=1, settings={"rate": 1e-5}, start=path)
+    assert (on.predict(test.pictures) == first.predict(test.pictures)).all()
+    others = stripes(20, 5.0, 0)
+    others = Demonstrations(others.pictures, others.sequences, ("a", "b", "c"), others.marginals)
+    with pytest.raises(ns.InputError, match="same network and actions"):
+        NetworkPrior("sinkhorn").fit(others, epochs=1, start=path)
+
+
 def test_a_temperature_set_afterwards_is_in_the_header(tmp_path: Path) -> None:
     torch.set_num_threads(1)
     prior = NetworkPrior("sinkhorn").fit(stripes(60, 250.0, 0), epochs=40)
@@ -128,6 +143,22 @@ def test_a_temperature_set_afterwards_is_in_the_header(tmp_path: Path) -> None:
     read = ns.load_prior(str(path))
     assert read.header["network"]["temperature"] != 1.0  # type: ignore[attr-defined]
     assert robustness.calibration_error(read.read(doubtful.pictures), shares) < 0.7 * before  # type: ignore[attr-defined]
+
+
+def test_the_command_keeps_some_to_choose_by(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("NEUROSYM_CACHE", str(tmp_path))
+    out = tmp_path / "own.safetensors"
+    styles = ["--pictures", "clean", "--pictures", "cluttered", "--option", "count=12", "--part", "learn"]
+    settings = ["--setting", "augment=1", "--setting", "least_steps=0", "--setting", "epochs=2", "--encoder", "conv"]
+    with pytest.raises(SystemExit) as left:
+        main(["train", "tower", "--prior", "sinkhorn", *styles, *settings, "--out", str(out)])
+    assert not left.value.code
+    header = read_header(out)
+    made_of = {"split": 0, "part": "learn", "pictures": "clean+cluttered", "seed": 0, "count": 12}
+    assert header["demonstrations"] == made_of
+    assert header["training"]["demonstrations"] == 24
+    assert (header["training"]["config"]["augment"], header["training"]["epochs"]) == (1, 2)
+    assert header["network"]["encoder"] == "conv"
 
 
 def test_robustness_is_a_table(tmp_path: Path) -> None:

@@ -51,10 +51,13 @@ def train(
         str,
         typer.Option(metavar="train|learn", help="learn: a sixth of train is kept, and says how sure to be of scores."),
     ] = "train",
-    augment: Annotated[
-        float | None, typer.Option(min=0, max=1, help="How much pictures change at every update. Default the recipe's.")
+    setting: Annotated[
+        list[str] | None, typer.Option(metavar="KEY=VALUE", help="Of the training: augment=1. May be repeated.")
     ] = None,
     epochs: Annotated[int | None, typer.Option(min=1, help="Default the recipe's.")] = None,
+    start: Annotated[
+        Path | None, typer.Option("--from", metavar="FILE", help="Weights to go on from, of the same prior.")
+    ] = None,
     encoder: Annotated[
         str | None, typer.Option(metavar="NAME", help="small (default) or paper, the paper's CNN.")
     ] = None,
@@ -94,8 +97,9 @@ def train(
     out.parent.mkdir(parents=True, exist_ok=True)
     with warnings.catch_warnings():
         warnings.showwarning = lambda message, *_, **__: common.say(f"Note: {message}")
-        settings = {} if augment is None else {"settings": {"augment": augment}}
-        _fit(learner, given, seed=seed, epochs=epochs, device=device, checkpoint=checkpoint, resume=resume, **settings)
+        more = {"settings": common.family_options(setting), "start": start}
+        more = {name: value for name, value in more.items() if value}
+        _fit(learner, given, seed=seed, epochs=epochs, device=device, checkpoint=checkpoint, resume=resume, **more)
     if part == "learn":
         learner.calibrate(shown("choose"))
     made_here = {"split": split, "part": part, "pictures": "+".join(styles), "seed": seed}
