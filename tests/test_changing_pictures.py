@@ -148,14 +148,15 @@ def test_a_temperature_set_afterwards_is_in_the_header(tmp_path: Path) -> None:
 def test_the_command_keeps_some_to_choose_by(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("NEUROSYM_CACHE", str(tmp_path))
     out = tmp_path / "own.safetensors"
-    styles = ["--pictures", "clean", "--pictures", "cluttered", "--option", "count=12", "--part", "learn"]
+    styles = ["--pictures", "clean", "--pictures", "cluttered", "--part", "learn", "--calibrate", "clean"]
     settings = ["--setting", "augment=1", "--setting", "least_steps=0", "--setting", "epochs=2", "--encoder", "conv"]
+    settings += ["--option", "count=12"]
     with pytest.raises(SystemExit) as left:
         main(["train", "tower", "--prior", "sinkhorn", *styles, *settings, "--out", str(out)])
     assert not left.value.code
     header = read_header(out)
     made_of = {"split": 0, "part": "learn", "pictures": "clean+cluttered", "seed": 0, "count": 12}
-    assert header["demonstrations"] == made_of
+    assert header["demonstrations"] == {**made_of, "calibrated": "clean"}
     assert header["training"]["demonstrations"] == 24
     assert (header["training"]["config"]["augment"], header["training"]["epochs"]) == (1, 2)
     assert header["network"]["encoder"] == "conv"

@@ -49,8 +49,12 @@ def train(
     ] = None,
     part: Annotated[
         str,
-        typer.Option(metavar="train|learn", help="learn: a sixth of train is kept, and says how sure to be of scores."),
+        typer.Option(metavar="train|learn", help="learn: a sixth of train is kept, and the scores calibrated by it."),
     ] = "train",
+    calibrate: Annotated[
+        list[common.PictureStyles] | None,
+        typer.Option(help="Styles by which scores are calibrated; may be repeated. Default, for learn, --pictures."),
+    ] = None,
     setting: Annotated[
         list[str] | None, typer.Option(metavar="KEY=VALUE", help="Of the training: augment=1. May be repeated.")
     ] = None,
@@ -70,8 +74,10 @@ def train(
 
     _check_suffix(out, ".safetensors")
     load_domain(domain)
-    if demos_file is not None and (split or option or pictures or part != "train"):
-        raise InputError("Expected --split, --pictures, --part, --option only without --demos, whose file has it all.")
+    if demos_file is not None and (split or option or pictures or calibrate or part != "train"):
+        raise InputError(
+            "Expected --split, --pictures, --part, --calibrate, --option only without --demos, whose file has it all."
+        )
     if part not in ("train", "learn"):
         raise UnknownNameError("part to learn from", part, ("train", "learn"))
     styles: list[Any] = [style.value for style in pictures or ()] or ["clean"]
@@ -86,11 +92,11 @@ def train(
         recipe = getattr(learner, "labels", "full")
         options = common.family_options(option)
 
-        def shown(part: str) -> Demonstrations:
+        def shown(part: str, styles: list[Any]) -> Demonstrations:
             parts = [_demonstrations(domain, part, split, recipe, style, seed, options) for style in styles]
             return type(parts[0]).joined(parts)
 
-        given = shown(part)
+        given = shown(part, styles)
     checkpoint = out.with_suffix(".checkpoint")
     if checkpoint.exists():
         common.say(f"Going on from {checkpoint}." if resume else f"Starting over; {checkpoint} is replaced.")
@@ -100,9 +106,10 @@ def train(
         more = {"settings": common.family_options(setting), "start": start}
         more = {name: value for name, value in more.items() if value}
         _fit(learner, given, seed=seed, epochs=epochs, device=device, checkpoint=checkpoint, resume=resume, **more)
-    if part == "learn":
-        learner.calibrate(shown("choose"))
     made_here = {"split": split, "part": part, "pictures": "+".join(styles), "seed": seed}
+    if by := [style.value for style in calibrate or ()] or (styles if part == "learn" else []):
+        learner.calibrate(shown("choose", by))
+        made_here["calibrated"] = "+".join(by)
     made_here |= common.family_options(option)
     learner.save(out, notes=made_here if demos_file is None else {"file": demos_file.name})
     checkpoint.unlink(missing_ok=True)
