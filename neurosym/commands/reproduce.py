@@ -65,7 +65,8 @@ def reproduce(
     with redirect_stdout(sys.stderr):
         if name == robustness.NAME:
             with progress_bar("priors") as progress:
-                page = robustness.report(robustness.reproduce(folder, progress=progress))
+                where = {name: value for name, value in given.items() if name != "say"}
+                page = robustness.report(robustness.reproduce(folder, progress=progress, **where))
         elif name in planning.SOMA_EXPERIMENTS:
             what = planning.soma_experiment(scale, name)
             styles = tuple(style.value for style in pictures or ()) or what.styles
