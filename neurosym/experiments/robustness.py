@@ -112,7 +112,7 @@ def _figures(subject: Subject, count: int) -> Iterator[tuple[str, str, str, floa
     for planner in PLANNERS:
         problems = subject.problems(BASE, count, subject.options)
         plain = [solve(p, planner=planner, rng=seed).iterations for p in problems for seed in range(2)]
-        yield "nothing", "none", f"iterations {planner}", float(np.mean(plain))
+        yield "no prior", "none", f"iterations {planner}", float(np.mean(plain))
         for name, change in SOMETHING_ELSE.items():
             changed = _changed(problems, change)
             guided = [
@@ -167,7 +167,7 @@ def report(records: pd.DataFrame) -> str:
         "Pictures of something else altogether: mean iterations, beside those without a prior.",
     ]
     for planner in PLANNERS:
-        lines += ["", f"{planner}:", "", *table(f"iterations {planner}", ["nothing", *SOMETHING_ELSE], 1, 2)]
+        lines += ["", f"{planner}:", "", *table(f"iterations {planner}", ["no prior", *SOMETHING_ELSE], 1, 2)]
     return "\n".join([*lines, "", provenance(), ""])
 
 

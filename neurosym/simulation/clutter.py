@@ -110,7 +110,7 @@ def turned_hues(pictures: Pixels, share: float) -> Pixels:
     flat = pictures.reshape(-1, pictures.shape[-2], 3)
     hsv = np.array(Image.fromarray(flat).convert("HSV"))
     hsv[..., 0] += np.uint8(round(256 * share) % 256)  # wraps, as hues do
-    return np.asarray(Image.fromarray(hsv, "HSV").convert("RGB")).reshape(pictures.shape)
+    return np.array(Image.fromarray(hsv, "HSV").convert("RGB")).reshape(pictures.shape)
 
 
 def _with_things(scene: Scene, ground: float, clutter: Clutter, rng: np.random.Generator) -> Scene:
