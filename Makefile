@@ -8,8 +8,9 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.neurosym-installed
 SRC := neurosym domains planners learned_priors tests examples $(wildcard benchmarks)
 OUT ?= out/compare-soma
+FUZZ_SECONDS ?= 3600
 
-.PHONY: help setup demo readme reproduce results test check bench docs clean constraints
+.PHONY: help setup demo readme reproduce results test fuzz check bench docs clean constraints
 
 help:
 	@echo "make demo       compare planners and priors on the 120 test cubes (table, results.csv, iterations.png)"
@@ -17,6 +18,7 @@ help:
 	@echo "make results    docs/results.md and its figures, from the last runs of make reproduce"
 	@echo "make test       the whole test suite"
 	@echo "make docs       the site in site/, links checked, without the network"
+	@echo "make fuzz       broken documents, and random assemblies against brute force (FUZZ_SECONDS=$(FUZZ_SECONDS))"
 	@echo "make check      ruff, mypy --strict, import-linter"
 	@echo "make bench      the benchmarks"
 	@echo "make setup      only make the virtual environment (VENV=$(VENV) PYTHON=$(PYTHON))"
@@ -55,6 +57,9 @@ results: $(STAMP)
 test: $(STAMP)
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2
 
+fuzz: $(STAMP)
+	OMP_NUM_THREADS=1 PYTHONPATH=tests/fuzz $(BIN)/python tests/fuzz/run.py $(FUZZ_SECONDS)
+
 check: $(STAMP)
 	$(BIN)/ruff check .
 	$(BIN)/mypy --strict
@@ -65,7 +70,7 @@ docs: $(STAMP)
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
 
 bench: $(STAMP)
-	@for file in benchmarks/*.py; do echo "== $$file"; OMP_NUM_THREADS=1 $(BIN)/python $$file || exit 1; done
+	@for file in benchmarks/*.py; do echo "== $$file"; NEUROSYM_KEEP=0 OMP_NUM_THREADS=1 $(BIN)/python $$file || exit 1; done
 
 # What is installed now becomes what is pinned. GPU libraries follow from torch and are left to it.
 constraints: $(STAMP)

@@ -16,6 +16,7 @@ from torch import Tensor
 from learned_priors.networks import NetworkConfig, OrderNetwork
 from neurosym.errors import CheckpointError
 from neurosym.planning.weights_header import read_header
+from neurosym.support.documents import MAX_BYTES, read_bytes
 from neurosym.support.files import written_whole
 
 #: Of the header; raised when an older reader would misread a file.
@@ -40,9 +41,10 @@ def read_tensors(path: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
             f"Expected schema {SCHEMA} in {path}; got {header.get('schema')!r}. "
             "It was written by another version: train again, or install that version."
         )
+    data = read_bytes(path, MAX_BYTES, CheckpointError)
     try:
-        return safetensors.torch.load(path.read_bytes()), header
-    except (SafetensorError, OSError, ValueError) as error:
+        return safetensors.torch.load(data), header
+    except (SafetensorError, ValueError) as error:
         raise CheckpointError(f"Expected {path} to be whole; it is damaged ({error}). Make it again.") from None
 
 

@@ -33,7 +33,12 @@ from .language.search_problem import (
     Step as Step,
     Verdict as Verdict,
 )
-from .pipeline import count_plans as count_plans, plans as plans, solve as solve
+from .pipeline import (
+    count_plans as count_plans,
+    order_marginals as order_marginals,
+    plans as plans,
+    solve as solve,
+)
 from .planning.budget import Budget as Budget
 from .planning.order_scores import OrderScores as OrderScores
 from .planning.planner import Planner as Planner, PlannerTraits as PlannerTraits

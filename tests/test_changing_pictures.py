@@ -150,7 +150,7 @@ def test_the_command_keeps_some_to_choose_by(tmp_path: Path, monkeypatch: pytest
     out = tmp_path / "own.safetensors"
     styles = ["--pictures", "clean", "--pictures", "cluttered", "--part", "learn", "--calibrate", "clean"]
     settings = ["--setting", "augment=1", "--setting", "least_steps=0", "--setting", "epochs=2", "--encoder", "conv"]
-    settings += ["--option", "count=12"]
+    settings += ["--option", "count=12", "--held-out", "0"]
     with pytest.raises(SystemExit) as left:
         main(["train", "tower", "--prior", "sinkhorn", *styles, *settings, "--out", str(out)])
     assert not left.value.code

@@ -163,3 +163,19 @@ def test_a_bearing_block_has_the_same_answers_in_every_format(tmp_path):
     up = {(name, other) for d, name, other in hits if tuple(graph.vectors[d]) == (0, 0, 1)}
     assert {("collar 0", "clip 0"), ("housing", "cap"), ("cap", "bolt 2")} <= up
     assert not {("pin 0", "base"), ("outer ring", "housing"), ("shaft", "inner ring")} & up  # pressed in, not stuck
+
+
+def test_the_notebook_runs_and_shows_tables_and_figures(tmp_path):
+    """As a notebook runs it, in a kernel of its own: results are tables, figures are pictures, no cell fails."""
+    nbclient = pytest.importorskip("nbclient", reason="nbclient is not installed (extra dev)")
+    pytest.importorskip("ipykernel", reason="ipykernel is not installed (extra dev)")
+    nbformat = pytest.importorskip("nbformat")
+    notebook = nbformat.read(FOLDER / "stool.ipynb", as_version=4)
+    ran = nbclient.NotebookClient(notebook, timeout=120, resources={"metadata": {"path": str(tmp_path)}}).execute()
+    outputs = [output for cell in ran.cells if cell.cell_type == "code" for output in cell.outputs]
+    assert not [o for o in outputs if o.output_type == "stream" and o.name == "stderr"]
+    shown = [set(o.data) for o in outputs if o.output_type == "execute_result"]
+    assert [("text/html" in s, "image/png" in s) for s in shown] == [
+        (True, False), (True, False), (True, False), (False, True), (True, False), (True, False), (False, True),
+        (False, True),
+    ]  # fmt: skip

@@ -18,6 +18,7 @@ import typer
 from neurosym.errors import InputError
 from neurosym.language.options import read_options
 from neurosym.language.problem_family import ProblemFamily, Progress
+from neurosym.support.documents import read_json
 from neurosym.support.files import write_text
 from neurosym.support.progress import heard_by, silent
 
@@ -89,13 +90,10 @@ class SearchOptions:
         """The user's puzzle, {name: [[x, y, z], ...]}, if there is one. Raises InputError: a file that has none."""
         if self.cells is None:
             return None
-        expected = f'Expected JSON {{"name": [[x, y, z], ...]}} in {self.cells}; got'
-        try:
-            given = json.loads(self.cells.read_text(encoding="utf-8"), object_pairs_hook=_each_once)
-        except ValueError as error:
-            raise InputError(f"{expected}: {error}.") from None
+        what = 'JSON {"name": [[x, y, z], ...]}'
+        given = read_json(self.cells, what, InputError)
         if not isinstance(given, dict) or not all(isinstance(own, list) for own in given.values()):
-            raise InputError(f"{expected} something else.")
+            raise InputError(f"Expected {what} in {self.cells}; got something else.")
         return given
 
 
@@ -107,15 +105,6 @@ def pair_of(text: str) -> tuple[str, str]:
     return names[0], names[1]
 
 
-def _each_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """A JSON object whose keys differ: of two pieces of one name, JSON itself would silently drop the first."""
-    names = [key for key, _ in pairs]
-    twice = sorted({n for n in names if names.count(n) > 1})
-    if twice:
-        raise ValueError(f"{', '.join(twice)} comes twice")
-    return dict(pairs)
-
-
 @dataclass(frozen=True)
 class FileOptions:
     """How an assembly's files are read, where they leave it open."""
@@ -125,13 +114,11 @@ class FileOptions:
     ] = None
     up: Annotated[Literal["y", "z"] | None, typer.Option(help="What is up in the files; default z, in glTF y.")] = None
     touch: Annotated[
-        float | None,
+        str | None,
         typer.Option(
-            metavar="SHARE",
-            min=1e-6,
-            max=0.5,
+            metavar="SHARE|auto",
             help="Faces so near, or overlapping so little, touch: a share of the smallest part's extent. "
-            "Default 0.001, raised where mating faces overlap.",
+            "Default 0.001, raised where mating faces overlap; auto: raised to the play of parts, too.",
         ),
     ] = None
     friction: Annotated[
@@ -154,7 +141,18 @@ class FileOptions:
         """As the library takes them."""
         from neurosym.geometry.readers.references import Reading
 
-        return Reading(**{**vars(self), "joint": dict(map(_joint_value, self.joint or [])) or None})
+        touch = self.touch if self.touch in (None, "auto") else _share(str(self.touch))
+        return Reading(**{**vars(self), "touch": touch, "joint": dict(map(_joint_value, self.joint or [])) or None})
+
+
+def _share(text: str) -> float:
+    try:
+        share = float(text)
+    except ValueError:
+        share = -1.0
+    if not 1e-6 <= share <= 0.5:
+        raise InputError(f"Expected --touch as auto, or a share of the smallest extent, 1e-6 to 0.5; got {text!r}.")
+    return share
 
 
 def _joint_value(text: str) -> tuple[str, float]:

@@ -12,7 +12,14 @@ from neurosym.commands import common
 from neurosym.errors import InputError, UnknownNameError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from neurosym.language.demonstrations import Demonstrations
+    from neurosym.language.problem import Problem
+    from neurosym.planning.prior import Prior
+
+#: Problems on which a trained prior is compared with none.
+WORTH = 20
 
 
 def demos(
@@ -67,9 +74,12 @@ def train(
     ] = None,
     device: Annotated[str, typer.Option(help="cpu or cuda.")] = "cpu",
     option: common.FamilyOptions = None,
+    held_out: Annotated[
+        float, typer.Option(min=0.0, max=0.9, metavar="SHARE", help="Of the problems, kept from training and measured.")
+    ] = 0.1,
     resume: Annotated[bool, typer.Option("--resume/--no-resume", help="Go on from a run that was killed.")] = True,
 ) -> None:
-    """Train a prior, with early figures; a run that was killed goes on where it was."""
+    """Train a prior, with early figures, and say what it saves; a run that was killed goes on where it was."""
     from neurosym.registry import load_domain, load_prior
 
     _check_suffix(out, ".safetensors")
@@ -103,8 +113,9 @@ def train(
     out.parent.mkdir(parents=True, exist_ok=True)
     with warnings.catch_warnings():
         warnings.showwarning = lambda message, *_, **__: common.say(f"Note: {message}")
-        more = {"settings": common.family_options(setting), "start": start}
-        more = {name: value for name, value in more.items() if value}
+        settings = {**({"held_out": held_out} if held_out else {}), **common.family_options(setting)}
+        given_of = {name: value for name, value in (("settings", settings), ("start", start)) if value}
+        more = common.taken_by(learner.fit, given_of)
         _fit(learner, given, seed=seed, epochs=epochs, device=device, checkpoint=checkpoint, resume=resume, **more)
     made_here = {"split": split, "part": part, "pictures": "+".join(styles), "seed": seed}
     if by := [style.value for style in calibrate or ()] or (styles if part == "learn" else []):
@@ -116,6 +127,30 @@ def train(
     figures = learner.header.get("training", {}) if hasattr(learner, "header") else {}
     took = f" in {figures['seconds']:.1f} s" if "seconds" in figures else ""
     print(f"{out}: {prior}, trained on {len(given)} demonstrations{took}, {out.stat().st_size / 1024:.0f} KiB")
+    family = load_domain(domain)
+    # Of the options some say which demonstrations, not which problems.
+    asked = common.taken_by(family.problem, common.family_options(option))
+    problems = family.problems("test", split=split, **asked)[:WORTH]
+    common.say(worth(learner, problems))
+
+
+def worth(prior: Prior, problems: Sequence[Problem]) -> str:
+    """Refusals with a prior and without one, on problems that it was not trained on, in a sentence that warns."""
+    from neurosym.pipeline import solve
+    from neurosym.planning.budget import Budget
+
+    try:
+        results = [[solve(p, prior=q, rng=0, budget=Budget(attempts=1000)) for p in problems] for q in (None, prior)]
+    except InputError as error:  # of other actions, or without pictures
+        return f"Note: what the prior saves was not measured: {error}"
+    without, guided = (sum(r.iterations for r in some) / max(len(some), 1) for some in results)
+    solved = [sum(r.solved for r in some) for some in results]
+    figures = f"{guided:.2f} refusals a plan, without a prior {without:.2f}"
+    saved = f"On {len(problems)} problems kept from training: {figures}"
+    if guided > without or solved[1] < solved[0]:
+        lost = f" ({solved[1]} are solved, without a prior {solved[0]})" if solved[1] < solved[0] else ""
+        return f"Warning: this prior makes planning worse. {saved}{lost}. Train longer, or on more demonstrations."
+    return f"{saved}: {without - guided:.2f} saved."
 
 
 def _fit(learner: Any, given: Demonstrations, **options: Any) -> None:

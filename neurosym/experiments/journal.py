@@ -8,6 +8,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from neurosym.errors import InputError
+from neurosym.support.documents import MAX_BYTES, read_bytes
+
 
 def key_of(configuration: Any) -> str:
     """A digest of everything that decides a result (JSON-able)."""
@@ -24,12 +27,12 @@ class Journal:
     def __init__(self, path: str | Path | None) -> None:
         self.path = None if path is None else Path(path)
         self._entries: dict[str, dict[str, Any]] = {}
-        content = self.path.read_bytes() if self.path is not None and self.path.exists() else b""
+        content = read_bytes(self.path, MAX_BYTES, InputError) if self.path is not None and self.path.exists() else b""
         # A line may be whole and lack only its end.
         self._torn = bool(content) and not content.endswith(b"\n")
         for line in content.split(b"\n"):
             # What a kill left half written is done again.
-            with contextlib.suppress(ValueError, KeyError, TypeError):
+            with contextlib.suppress(ValueError, KeyError, TypeError, RecursionError):
                 self._keep(line)
 
     def __contains__(self, key: str) -> bool:

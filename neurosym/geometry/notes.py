@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from neurosym.errors import AssemblyError
 
-#: Faults shown in one message; the error's `notes` has them all.
-SHOWN = 20
+#: Characters of faults in one message; the error's `notes` has them all.
+SHOWN = 700
 
 
 @dataclass(frozen=True)
@@ -40,9 +40,12 @@ class FaultyPartsError(AssemblyError):
 
     def __init__(self, source: str, faults: Iterable[Note], hint: str = "") -> None:
         self.notes = tuple(faults)
-        lines = [f"  {fault}" for fault in self.notes[:SHOWN]]
-        if len(self.notes) > SHOWN:
-            lines.append(f"  and {len(self.notes) - SHOWN} more.")
+        lines: list[str] = []
+        for fault in self.notes:
+            if lines and sum(map(len, lines)) + len(str(fault)) > SHOWN:
+                lines.append(f"  and {len(self.notes) - len(lines)} more.")
+                break
+            lines.append(f"  {fault}")
         lines += [hint] if hint else []
         parts = len({name for fault in self.notes for name in (fault.part, fault.other) if name})
         head = f"Expected sound parts in {source}; got {len(self.notes)} fault{'s' if len(self.notes) != 1 else ''}"

@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from neurosym.errors import AssemblyError
 from neurosym.support.arrays import Array, Numbers
+
+#: How long a body may be, in its unit: beyond, squares and cubes of lengths lose all digits.
+SMALLEST, LARGEST = 1e-9, 1e9
+
+#: What a density may be, bodies of one part among each other left out.
+LIGHTEST, HEAVIEST = 1e-30, 1e30
+
+#: Of a body's thickness: steps of coordinates that count, as `Tolerances.touch` by default.
+TOUCH = 1e-3
 
 #: Corners of a unit box about the origin, and its twelve triangles with outward normals.
 _CORNERS = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
@@ -34,20 +43,26 @@ class Box:
         return _BOX_FACES
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Convex:
     """A convex body. ``vertices``: float64 (n, 3); ``faces``: int64 (m, 3), outward."""
 
     vertices: Array
     faces: Numbers
 
+    def __repr__(self) -> str:
+        return f"Convex({len(self.vertices)} vertices, {len(self.faces)} faces)"
 
-@dataclass(frozen=True, eq=False)
+
+@dataclass(frozen=True, eq=False, repr=False)
 class Mesh:
     """A closed triangle mesh, convex or not. ``vertices``: float64 (n, 3); ``faces``: int64 (m, 3), outward."""
 
     vertices: Array
     faces: Numbers
+
+    def __repr__(self) -> str:
+        return f"Mesh({len(self.vertices)} vertices, {len(self.faces)} faces)"
 
 
 Shape = Box | Convex | Mesh
@@ -58,11 +73,11 @@ class Body:
     """One shape of a part. ``X_PB``: float64 (4, 4), its pose in the part's frame; ``density``: times the part's."""
 
     shape: Shape
-    X_PB: Array
+    X_PB: Array = field(repr=False)
     density: float = 1.0
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Part:
     """A rigid part: bodies that move together. ``X_WP``: float64 (4, 4); ``density``: mass per unit of volume."""
 
@@ -74,9 +89,32 @@ class Part:
     def __post_init__(self) -> None:
         if not self.bodies:
             raise AssemblyError(f"Expected part {self.name!r} to have at least one body; it is empty.")
-        arrays = (array for b in self.bodies for array in (b.shape.vertices, self.X_WP @ b.X_PB))
-        if not all(np.isfinite(array).all() for array in arrays):
-            raise AssemblyError(f"Expected finite coordinates; part {self.name!r} has NaN or infinity.")
+        for body in self.bodies:
+            vertices, X = body.shape.vertices, self.X_WP @ body.X_PB
+            if not (np.isfinite(vertices).all() and np.isfinite(X).all()):
+                raise AssemblyError(f"Expected finite coordinates; part {self.name!r} has NaN or infinity.")
+            sizes = body.shape.size if isinstance(body.shape, Box) else np.ptp(vertices, axis=0)
+            self._check_range(float(sizes.max()), float(np.abs(X[:3, 3]).max()), float(sizes.min()))
+        if not LIGHTEST <= self.density <= HEAVIEST:
+            raise AssemblyError(
+                f"Expected a density of {LIGHTEST:g} to {HEAVIEST:g}; part {self.name!r} has {self.density:g}."
+            )
+
+    def _check_range(self, size: float, away: float, thin: float) -> None:
+        """Refuse what is so small, so large or so far that rounding would decide."""
+        if not SMALLEST <= size <= LARGEST:
+            found = f"a body {size:g} long"
+        elif away > LARGEST or 4 * away * np.finfo(float).eps > TOUCH * max(thin, SMALLEST):
+            found = f"one {thin:g} thin that lies {away:g} away"
+        else:
+            return
+        raise AssemblyError(
+            f"Expected bodies {SMALLEST:g} to {LARGEST:g} long, not so far from the origin that coordinates come in "
+            f"steps that count; part {self.name!r} has {found}. Use another unit, or move the assembly to the origin."
+        )
+
+    def __repr__(self) -> str:
+        return f"Part({self.name!r}, {len(self.bodies)} {'body' if len(self.bodies) == 1 else 'bodies'})"
 
 
 def boxes_part(name: str, centres: Array, size: Array, X_WP: Array | None = None, density: float = 1.0) -> Part:

@@ -1,10 +1,10 @@
 """Action schemas: what an action needs and what it changes, over typed parameters."""
 
 import string
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 from neurosym.errors import DefinitionError
-from neurosym.language.terms import Condition, Derived, Literal, Variable, as_literal
+from neurosym.language.terms import Condition, Derived, Fluent, Literal, Variable, as_literal
 
 
 class Action:
@@ -82,11 +82,16 @@ class Action:
         return f"Action({self.name!r}, {', '.join(map(str, self.params))})"
 
 
-def moved_parts(effects: Sequence[Literal], names: Sequence[str]) -> tuple[tuple[str, ...], bool]:
+def moved_parts(
+    effects: Sequence[Literal], names: Sequence[str], presence: Collection[Fluent] = ()
+) -> tuple[tuple[str, ...], bool]:
     """Which of some names leave, by effects that only delete atoms of them; else which arrive, by such that only add.
+
+    `presence`: fluents that say which parts are there; the others then say nothing of it. Empty: any may.
 
     Returns the names, and whether they arrive.
     """
-    added, deleted = ({a for e in effects if e.positive is sign for a in e.atom.args} for sign in (True, False))
+    told = [e for e in effects if not presence or e.atom.predicate in presence]
+    added, deleted = ({a for e in told if e.positive is sign for a in e.atom.args} for sign in (True, False))
     leaving = tuple(name for name in names if name in deleted - added)
     return (leaving, False) if leaving else (tuple(name for name in names if name in added - deleted), True)

@@ -5,7 +5,7 @@ Stored as ``.npz`` without pickle. Shapes: M demonstrations, V views of H x W pi
 
 from __future__ import annotations
 
-import zipfile
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from neurosym.errors import DemonstrationError
 from neurosym.support.arrays import Numbers, Pixels
+from neurosym.support.documents import read_arrays
 from neurosym.support.files import replacing
 
 SCHEMA = 1
@@ -128,13 +129,10 @@ class Demonstrations:
     @classmethod
     def load(cls, path: str | Path) -> Demonstrations:
         """Read what `save` wrote, or a user's own ``.npz`` with pictures, sequences and actions."""
-        try:
-            with np.load(path, allow_pickle=False) as file:  # a lone array has no `files`
-                data = {name: file[name] for name in file.files}
-        except FileNotFoundError:
-            raise DemonstrationError(f"Expected demonstrations at {path}; there is no such file.") from None
-        except (OSError, ValueError, zipfile.BadZipFile, EOFError, AttributeError, TypeError) as error:
-            raise DemonstrationError(f"Expected {path} to be an .npz file of plain arrays; got: {error}.") from None
+        path = Path(path)
+        if not os.path.exists(path):
+            raise DemonstrationError(f"Expected demonstrations at {path}; there is no such file.")
+        data = read_arrays(path, "an .npz file of plain arrays", DemonstrationError)
         missing = [k for k in ("pictures", "sequences", "actions") if k not in data]
         if missing:
             raise DemonstrationError(
@@ -153,7 +151,7 @@ class Demonstrations:
             data.get("marginals"),
             data.get("groups"),
             str(data.get("domain", "")),
-            tuple(data.get("classes", ())),
+            tuple(np.atleast_1d(data.get("classes", ())).tolist()),
         )
 
 

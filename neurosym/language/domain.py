@@ -1,6 +1,7 @@
 """Domains: fluents and actions, checked at once, with the place of every mistake named."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from functools import cached_property
 from typing import Any
 
 from neurosym.errors import DefinitionError
@@ -38,6 +39,13 @@ class Domain:
                             f"In domain {name!r}, action {action.name!r}, {where}[{i}]: the fluent {predicate} is not "
                             f"declared; expected one of {', '.join(f.name for f in fluents) or 'none'}."
                         )
+
+    @cached_property
+    def presence(self) -> frozenset[Fluent]:
+        """The fluents that say which parts are there: those that its ready-made predicates were made from."""
+        literals = (literal for action in self.actions for literal in action.pre)
+        made = (p.made_by for literal in literals if isinstance(p := literal.atom.predicate, Derived) and p.made_by)
+        return frozenset(a for _, args, options in made for a in (*args, *options.values()) if isinstance(a, Fluent))
 
     def problem(
         self,

@@ -72,7 +72,8 @@ class GroundProblem:
         self._goal_pos = self._mask(g.atom for g in self._fluent_goals if g.positive)
         self._goal_neg = self._mask(g.atom for g in self._fluent_goals if not g.positive)
         self._done_bits = done
-        self.classes: tuple[int, ...] = self._classes(all_names, {a for pair in precedence for a in pair})
+        self._all_names, self._constrained = all_names, {a for pair in precedence for a in pair}
+        self._stated_classes = self._classes(problem.interchangeable)
         self._touching: dict[Atom, tuple[int, ...]] = {}
         self._promises: dict[tuple[Atom, ...], tuple[tuple[int, ...], int]] = {}
         for i, instance in enumerate(reachable):
@@ -119,7 +120,9 @@ class GroundProblem:
                 stated = _as_motion(predicate, verdict.motion)
                 motion = stated if motion is None else motion.joined(stated)
         if motion is not None:
-            parts, arrive = moved_parts(self._effects[action], getattr(self.world, "names", ()))
+            parts, arrive = moved_parts(
+                self._effects[action], getattr(self.world, "names", ()), self.problem.domain.presence
+            )
             motion = motion.of_parts(parts, arrive=arrive)
         return None, motion
 
@@ -237,21 +240,28 @@ class GroundProblem:
             mask |= 1 << self._bits[atom]
         return mask
 
-    def _classes(self, all_names: Sequence[str], constrained: set[int]) -> tuple[int, ...]:
+    @cached_property
+    def classes(self) -> tuple[int, ...]:
+        """One integer an action: of the groups that the problem states, else of those that its semantics knows."""
+        if self.problem.interchangeable:
+            return self._stated_classes
+        return self._classes(self.problem.semantics.interchangeable(self.problem))
+
+    def _classes(self, groups: Sequence[Sequence[str]]) -> tuple[int, ...]:
         place = f"In problem {self.problem.name!r}, interchangeable"
         index = {name: i for i, name in enumerate(self.actions)}
         classes = list(range(len(self.actions)))
         grouped: set[str] = set()
-        for number, group in enumerate(self.problem.interchangeable):
+        for number, group in enumerate(groups):
             for name in group:
-                if name not in all_names:
-                    raise DefinitionError(f"{place}[{number}]: {UnknownNameError('action', name, all_names)}")
+                if name not in self._all_names:
+                    raise DefinitionError(f"{place}[{number}]: {UnknownNameError('action', name, self._all_names)}")
             twice = grouped & set(group)
             if twice or len(set(group)) != len(group):
                 raise DefinitionError(f"{place}: expected each action in one group; {sorted(twice) or group} is not.")
             grouped |= set(group)
             # An action that the user's precedence singles out is no longer like the others.
-            members = [index[name] for name in group if name in index and index[name] not in constrained]
+            members = [index[name] for name in group if name in index and index[name] not in self._constrained]
             for member in members:
                 classes[member] = members[0]
         return tuple(classes)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import json
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +16,7 @@ from neurosym.language.search_problem import Rejection
 from neurosym.plan_files.writing import SCHEMA
 from neurosym.planning.result import Status
 from neurosym.registry import load_domain
+from neurosym.support.documents import read_json
 
 #: Figures of a search.
 COUNTS = ("iterations", "attempts", "expansions", "seconds")
@@ -133,14 +134,18 @@ def problem_of(document: Mapping[str, Any], path: str | Path = "plan.json") -> P
     return made
 
 
+def is_plan(path: Path) -> bool:
+    """Whether a file is a plan's: JSON that names a domain and steps. Anything else is left to the loader."""
+    if path.is_dir() or path.suffix.lower() != ".json":
+        return False
+    document = read_document(path)
+    return "domain" in document and "steps" in document
+
+
 def read_document(path: Path) -> dict[str, Any]:
-    try:
-        document = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        reason = error.strerror or error
-        raise InputError(f"Expected a plan at {path}; {reason}. Write one with `neurosym plan ... --out`.") from None
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"Expected JSON, as `neurosym plan --out` writes it, in {path}; got: {error}.") from None
+    if not os.path.exists(path):
+        raise InputError(f"Expected a plan at {path}; there is no such file. Write one with `neurosym plan ... --out`.")
+    document = read_json(path, "JSON, as `neurosym plan --out` writes it,", InputError)
     if not isinstance(document, dict):
         raise InputError(f"Expected a JSON object, as `neurosym plan --out` writes it, in {path}; got something else.")
     return document

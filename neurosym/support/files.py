@@ -1,6 +1,7 @@
 """Files that are written whole or not at all: what reads them, or a kill, never meets half a file."""
 
 import contextlib
+import errno
 import os
 import secrets
 from collections.abc import Iterator
@@ -12,6 +13,8 @@ from typing import IO
 def replacing(path: str | Path) -> Iterator[Path]:
     """A path to write to; renamed to `path` when the block ends well, removed when it does not. Makes the folder."""
     path = Path(path)
+    if not path.name:
+        raise IsADirectoryError(errno.EISDIR, "Expected the name of a file to write; got a folder", str(path))
     path.parent.mkdir(parents=True, exist_ok=True)
     # Beside the target, so that the rename stays on one file system; the ending stays, for writers that go by it.
     temporary = path.with_name(f".{path.stem}-{secrets.token_hex(4)}{path.suffix}")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
 
 from neurosym.geometry.mesh import distances as points_and_trees
 from neurosym.geometry.mesh import kernels, trees
@@ -11,6 +10,9 @@ from neurosym.geometry.mesh.connections import adjacent, alike, has_valley
 from neurosym.geometry.mesh.flats import Flats
 from neurosym.geometry.mesh.topology import in_use, signed_volume
 from neurosym.support.arrays import Array, Numbers, Truths
+
+#: So many flats of a mesh are looked at as lids.
+LIDS = 16
 
 #: Which of 997 faces are held against all vertices first: of most surfaces that are not convex one of them shows it.
 _SOME = np.arange(32) * 617 % 997
@@ -38,6 +40,8 @@ def are_convex(vertices: Array, faces: Numbers, margin: float) -> bool:
     faces = alike(vertices)[0][faces]
     if has_valley(vertices, faces, adjacent(faces), margin):
         return False
+    from scipy.spatial import ConvexHull, QhullError
+
     try:
         hull = ConvexHull(corners)
     except QhullError:
@@ -61,11 +65,15 @@ def crossing_pairs(vertices: Array, faces: Numbers, margin: float) -> Numbers:
     areas = np.linalg.norm(vectors, axis=1)
     normals = vectors / np.maximum(areas, 1e-300)[:, None]
     # Fans and flat lids have many neighbours in their own plane: they come one after the other, and are left out.
-    label = Flats.of(t, normals, areas, middles, body, adjacent(faces), margin).of_triangle
+    flats = Flats.of(t, normals, areas, middles, body, adjacent(faces), margin)
+    label = flats.of_triangle
     order = np.argsort(label, kind="stable")
     order = order[trees.along_curve(t[order, 0], label[order])]
-    t, normals, first = t[order], normals[order], np.array([0, len(t)])
-    nodes, labels = kernels.tree_bounds(t, body == 0, first), trees.tree_labels(label[order], first)
+    order = order[~np.isin(label[order], _uncrossed(flats, t, margin))]
+    if not len(order):
+        return np.zeros((0, 2), dtype=np.int64)
+    t, normals, first = t[order], normals[order], np.array([0, len(order)])
+    nodes, labels = kernels.tree_bounds(t, body[order] == 0, first), trees.tree_labels(label[order], first)
     one = np.zeros((1, 2), dtype=np.int64)
     i, j = kernels.straddling_pairs(*nodes, *nodes, labels, t, normals, first, one, margin).T[1:]
     if not len(i):
@@ -75,6 +83,22 @@ def crossing_pairs(vertices: Array, faces: Numbers, margin: float) -> Numbers:
         hit |= pierced(t[i][:, [k, (k + 1) % 3]], t[j], normals[j], margin)[0]
         hit |= pierced(t[j][:, [k, (k + 1) % 3]], t[i], normals[i], margin)[0]
     return np.asarray(order[np.stack([i[hit], j[hit]], axis=1)])
+
+
+def _uncrossed(flats: Flats, t: Array, margin: float) -> Numbers:
+    """Numbers of the largest flats, `LIDS` at the most, whose plane no triangle (m, 3, 3) reaches beyond near them.
+
+    Triangles of a lid are long and thin: their bounds meet those of every wall about it.
+    """
+    size = np.bincount(flats.of_triangle + 1, minlength=len(flats.normals) + 1)[1:]
+    uncrossed = []
+    low, high = t.min(axis=1), t.max(axis=1)
+    for flat in np.argsort(-size, kind="stable")[:LIDS]:
+        near = ((low <= flats.high[flat]) & (high >= flats.low[flat])).all(axis=1)
+        height = (t[near] - flats.middles[flat]) @ flats.normals[flat]
+        if not ((height.min(axis=1) < -margin) & (height.max(axis=1) > margin)).any():
+            uncrossed.append(int(flat))
+    return np.array(uncrossed, dtype=np.int64)
 
 
 def pierced(

@@ -32,6 +32,7 @@ from neurosym.geometry.rigid_motions import are_rigid
 from neurosym.geometry.shapes import Body, Box, Convex, Mesh, Part, Shape, boxes_part
 from neurosym.geometry.tolerances import DEFAULT_TOLERANCES, Tolerances
 from neurosym.support.arrays import Array
+from neurosym.support.documents import each_once
 from neurosym.support.files import write_text
 
 FORMAT = "neurosym-assembly"
@@ -93,7 +94,7 @@ def read_json(path: Path, read_mesh: Callable[[Path], RawMesh]) -> Contents:
     """The assembly in a file; `read_mesh` reads a mesh that a part names by its path. Errors name the place."""
     try:
         text = gunzip(read_bytes(path, MAX_TEXT_BYTES), path).decode("utf-8")
-        given = json.loads(text, object_pairs_hook=_each_once, parse_constant=_no_constant)
+        given = json.loads(text, object_pairs_hook=each_once, parse_constant=_no_constant)
     except (ValueError, RecursionError) as error:
         if isinstance(error, AssemblyError):
             raise
@@ -221,14 +222,6 @@ def _body(at: str, given: Any) -> Body:
 
 
 # -- values ---------------------------------------------------------------------------------------------------
-
-
-def _each_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    entries = dict(pairs)
-    if len(entries) != len(pairs):
-        keys = [k for k, _ in pairs]
-        raise ValueError(f"{next(_brief(k) for k in keys if keys.count(k) > 1)} comes twice in one object")
-    return entries
 
 
 def _no_constant(name: str) -> float:

@@ -26,6 +26,7 @@ from neurosym.geometry.notes import Note
 from neurosym.geometry.readers import limits
 from neurosym.geometry.readers.contents import FLOAT32, Y_UP, Contents, RawMesh, united
 from neurosym.support.arrays import Array, Numbers
+from neurosym.support.documents import MAX_BYTES, too_large
 
 Piece = tuple[Array, Numbers]
 
@@ -54,7 +55,7 @@ def open_gltf(data: bytes, path: Path) -> Scene:
     with limits.reading("glTF 2.0", path):
         text, binary = _chunks(data, path) if data.startswith(b"glTF") else (data, None)
         if len(text) > limits.MAX_TEXT_BYTES:
-            raise limits.too_large(path, limits.MAX_TEXT_BYTES)
+            raise AssemblyError(too_large(path, limits.MAX_TEXT_BYTES))
         return Scene(json.loads(text.decode("utf-8")), binary, path)
 
 
@@ -215,8 +216,8 @@ class Scene:
     def _buffer(self, number: int) -> bytes:
         if number not in self._buffers:
             self._buffers[number] = self._fetch(self.tree["buffers"][number].get("uri"))
-            if sum(map(len, self._buffers.values())) > limits.MAX_BYTES:
-                raise limits.too_large(self.path, limits.MAX_BYTES)
+            if sum(map(len, self._buffers.values())) > MAX_BYTES:
+                raise AssemblyError(too_large(self.path, MAX_BYTES))
         return self._buffers[number]
 
     def _fetch(self, uri: str | None) -> bytes:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import gzip
 import io
-import stat
 from collections.abc import Iterator
 from pathlib import Path
 from typing import IO
@@ -13,9 +12,8 @@ from typing import IO
 import numpy as np
 
 from neurosym.errors import AssemblyError, NeurosymError
-
-#: A file, or what a compressed one unpacks to, may be this large. 10 million triangles of STL are half of it.
-MAX_BYTES = 1 << 30
+from neurosym.support import documents
+from neurosym.support.documents import MAX_BYTES, too_large
 
 #: An XML or JSON text may be this large: parsed, it takes some twenty times as much memory.
 MAX_TEXT_BYTES = 1 << 28
@@ -53,29 +51,15 @@ def within_limits(path: Path, faces: int, total: int = 0, parts: int = 0) -> Non
 
 def read_bytes(path: Path, limit: int = MAX_BYTES) -> bytes:
     """A file no larger than `limit`; `AssemblyError` for one that is larger, no regular file, or not to be read."""
-    try:
-        status = path.stat()
-        if not stat.S_ISREG(status.st_mode):
-            raise AssemblyError(f"Expected a regular file; {path} is none.")
-        if status.st_size > limit:
-            raise too_large(path, limit)
-        with open(path, "rb") as file:
-            return limited(file, path, limit)
-    except (OSError, ValueError) as error:
-        raise AssemblyError(f"Expected a file that can be read; got {path}: {error}.") from None
+    return documents.read_bytes(path, limit, AssemblyError)
 
 
 def limited(file: IO[bytes] | gzip.GzipFile, path: Path, limit: int) -> bytes:
     """All bytes of a stream, which is or comes from `path`; `AssemblyError` where there are more than `limit`."""
     data = file.read(limit + 1)
     if len(data) > limit:
-        raise too_large(path, limit)
+        raise AssemblyError(too_large(path, limit))
     return data
-
-
-def too_large(path: Path, limit: int) -> AssemblyError:
-    """The error for a file beyond a limit of bytes."""
-    return AssemblyError(f"Expected at most {limit:,} bytes in {path}; it has more. Give simpler meshes, or fewer.")
 
 
 def gunzip(data: bytes, path: Path, limit: int = MAX_TEXT_BYTES) -> bytes:

@@ -14,11 +14,9 @@ from neurosym.geometry.mesh import topology, triangles
 from neurosym.geometry.notes import Note
 from neurosym.geometry.readers.contents import RawMesh
 from neurosym.geometry.readers.limits import MAX_FACES
+from neurosym.geometry.shapes import LARGEST, SMALLEST
 from neurosym.geometry.tolerances import DEFAULT_TOLERANCES
 from neurosym.support.arrays import Array, Numbers, extents
-
-#: Extents of a part lie between these, in the file's unit: beyond, squares and cubes of lengths lose all digits.
-SMALLEST, LARGEST = 1e-9, 1e9
 
 #: Corners nearer than this share of the part are one: text has some eight digits, a 32-bit number seven.
 MERGE = 1e-6
@@ -114,7 +112,7 @@ def _can_be_measured(vertices: Array, faces: Numbers, rounding: float, report: _
         return False
     away = float(np.abs(corners).max())
     step = 2 * away * rounding
-    thin = float(reach[reach > SMALLEST].min())
+    thin = float(reach[reach >= SMALLEST].min())
     if step > DEFAULT_TOLERANCES.touch * thin / 4:
         sentence = f"lies {away:g} from the origin, where coordinates come in steps of {step:.2g}; it is {thin:g} thin"
         report.fault("far", away, sentence, "Move the assembly to the origin before exporting it.")

@@ -144,9 +144,10 @@ def _cells(local: Array, faces: Numbers, pitch: float) -> Numbers | None:
     """The cells, int64 (n, 3) from 0, that a mesh in the grid's frame is the union of; None when it is not."""
     check()
     low = local.min(axis=0)
-    counts = np.round(np.ptp(local, axis=0) / pitch).astype(int)
-    if counts.min() < 1 or counts.prod() > MAX_CELLS:
+    along = np.round(np.ptp(local, axis=0) / pitch)
+    if along.min() < 1 or along.prod() > MAX_CELLS:
         return None
+    counts = along.astype(int)
     offsets = (local - low) / pitch
     if np.abs(offsets - np.round(offsets)).max() > 0.01:
         return None

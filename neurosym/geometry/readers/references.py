@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
@@ -20,12 +21,13 @@ from neurosym.support.progress import Progress, silent
 class Reading:
     """How an assembly is read, where its files leave it open; None: as `load` does by itself.
 
-    `touch` is `Tolerances.touch`; `puzzle` the number of a puzzle's problem; `joint` the values of a robot's joints.
+    `touch` is `Tolerances.touch`, or "auto": faces of parts drawn with play touch; `puzzle` the number of a puzzle's
+    problem; `joint` the values of a robot's joints.
     """
 
     units: str | None = None
     up: str | None = None
-    touch: float | None = None
+    touch: float | str | None = None
     friction: float | None = None
     puzzle: int | None = None
     solution: int | None = None
@@ -36,7 +38,10 @@ class Reading:
         """The assembly at a path; raises what `neurosym.geometry.readers.loading.load` does."""
         asked: dict[str, Any] = {"units": self.units, "up": self.up, "friction": self.friction, "joints": self.joint}
         asked |= {"problem": self.puzzle, "solution": self.solution, "meshes": self.meshes}
-        asked |= {"tolerances": None if self.touch is None else Tolerances(touch=self.touch)}
+        if self.touch == "auto":
+            asked |= {"touching_gaps": True}
+        elif self.touch is not None:
+            asked |= {"tolerances": Tolerances(touch=float(self.touch))}
         return Assembly.load(path, progress=progress, **{k: v for k, v in asked.items() if v is not None})
 
     def as_json(self) -> dict[str, Any]:
@@ -69,7 +74,7 @@ def referenced(given: Any, beside: Path) -> Assembly:
     if not isinstance(path, str):
         raise InputError(f'Expected "assembly" in {beside} with the "path" of an assembly; got {given!r}.')
     places = [Path(path), beside.parent / Path(path).name]
-    place = next(filter(Path.exists, places), None)
+    place = next(filter(os.path.exists, places), None)
     if place is None:
         raise InputError(f"Expected the assembly of {beside} at {places[0]} or at {places[1]}; it is in neither place.")
     assembly = Reading.from_json(given).load(place)

@@ -12,7 +12,8 @@ from neurosym.geometry.mesh import topology, triangles
 from neurosym.geometry.mesh.broad_phase import CHUNK, near_pairs
 from neurosym.geometry.notes import Note
 from neurosym.geometry.readers.contents import Contents, RawMesh, united
-from neurosym.geometry.readers.mesh_checks import FLAT, LARGEST, MERGE
+from neurosym.geometry.readers.mesh_checks import FLAT, MERGE
+from neurosym.geometry.shapes import LARGEST
 from neurosym.support.arrays import Array, Numbers, extents
 
 
