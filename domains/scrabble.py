@@ -16,7 +16,7 @@ import numpy as np
 from domains import scrabble_tiles
 from domains.scrabble_demonstrations import demonstrate, picture_seed
 from domains.scrabble_rules import DOMAIN, Reference, all_slots_filled, laid, tile
-from domains.scrabble_tiles import COUNTS, LONGEST, N_TEST, N_TRAIN, SHORTEST, TILES, VALUES
+from domains.scrabble_tiles import COUNTS, LONGEST, N_CHOOSE, N_TEST, N_TRAIN, SHORTEST, TILES, VALUES
 from neurosym.errors import InputError, UnknownNameError
 from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.rigid_motions import shifted
@@ -29,7 +29,10 @@ from neurosym.language.problem_family import ProblemFamily, Progress
 from neurosym.support.arrays import Pixels
 
 #: How many problems of a part are meant where nobody says how many: enough for `compare`, and for its blind baseline.
-DEFAULT_COUNTS = {"train": 50, "test": 200}
+DEFAULT_COUNTS = {"train": 50, "learn": 50, "choose": 50, "test": 200}
+#: First of each part, counted from the start of the split, and how many there are.
+_FIRST, _SIZES = {"test": N_TRAIN, "choose": N_TRAIN - N_CHOOSE}, {"train": N_TRAIN, "learn": N_TRAIN - N_CHOOSE}
+_SIZES |= {"choose": N_CHOOSE, "test": N_TEST}
 #: A tile: its edges, and from the middle of one slot to that of the next (edges of a tile); wood, RGB in 0..1.
 SIZE, PITCH, WOOD = (1.0, 1.0, 0.22), 1.04, (0.87, 0.72, 0.50)
 
@@ -102,17 +105,16 @@ class ScrabbleFamily(ProblemFamily):
 
     def numbers(self, part: str = "test", *, split: int = 0, count: int | None = None) -> range | tuple[int, ...]:
         """Numbers of the first `count` problems of a part: of 5,000 to test (default 200), of 10,000 to train (50)."""
-        sizes = {"train": N_TRAIN, "test": N_TEST}
         if part == "all":
             return (*self.numbers("train", split=split, count=count), *self.numbers("test", split=split, count=count))
-        if part not in sizes:
-            raise UnknownNameError("part", part, ["all", *sizes])
+        if part not in _SIZES:
+            raise UnknownNameError("part", part, ["all", *_SIZES])
         wanted = DEFAULT_COUNTS[part] if count is None else count
-        if not 1 <= wanted <= sizes[part]:
-            raise InputError(f"Expected 1 to {sizes[part]:,} problems of the part {part!r}; got count={count!r}.")
+        if not 1 <= wanted <= _SIZES[part]:
+            raise InputError(f"Expected 1 to {_SIZES[part]:,} problems of the part {part!r}; got count={count!r}.")
         if split < 0:
             raise InputError(f"Expected a split of 0 or more; got {split}.")
-        start = split * (N_TRAIN + N_TEST) + (N_TRAIN if part == "test" else 0)
+        start = split * (N_TRAIN + N_TEST) + _FIRST.get(part, 0)
         return range(start, start + wanted)
 
     def problems(
@@ -166,7 +168,7 @@ class ScrabbleFamily(ProblemFamily):
 
         Default: all 10,000 of ``"train"``, or the 5,000 of ``"test"``. The pictures are those of `problem`, by seed.
         """
-        everything = {"train": N_TRAIN, "test": N_TEST}.get(part)
+        everything = _SIZES.get(part)
         numbers = self.numbers(part, split=split, count=everything if count is None else count)
         shown = [(self.word(n, tiles=tiles, words=words), n) for n in numbers]
         names = scrabble_tiles.first_tiles(tiles)

@@ -12,6 +12,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from neurosym.errors import InputError
+from neurosym.language.problem_family import CHOOSE_SHARE
 
 
 def _each(letters_of: dict[int, str]) -> dict[str, int]:
@@ -26,6 +27,8 @@ VALUES = _each({1: "aeilnorstu", 2: "dg", 3: "bcmp", 4: "fhvwy", 5: "k", 8: "jx"
 SHORTEST, LONGEST = 3, 6
 #: Random problems of one split; the numbers of split s begin at s * (N_TRAIN + N_TEST), the training ones first.
 N_TRAIN, N_TEST = 10_000, 5_000
+#: The last of those to train, kept for choosing settings.
+N_CHOOSE = round(CHOOSE_SHARE * N_TRAIN)
 #: One letter sequence in so many belongs to the test part.
 _TEST_SHARE = 3
 #: Kept apart from any user's seed.

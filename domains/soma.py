@@ -18,7 +18,7 @@ from neurosym.geometry.queries import AssemblyGeometry
 from neurosym.language import Action, Domain, Fluent, Problem, Simulation, Type, predicates
 from neurosym.language.demonstrations import Demonstrations
 from neurosym.language.problem import as_names
-from neurosym.language.problem_family import ProblemFamily, Progress
+from neurosym.language.problem_family import ProblemFamily, Progress, part_to_choose
 from neurosym.support.arrays import Pixels
 
 piece = Type("piece")
@@ -40,7 +40,7 @@ DOMAINS: dict[str, Domain] = {rule: _take_apart(rule) for rule in RULES}
 N_TRAIN = 120
 
 #: Styles of pictures.
-STYLES = ("clean", "varied")
+STYLES = ("clean", "varied", "cluttered")
 
 #: Kept apart from any user's seed, so that a split never repeats the draws of a search.
 _SPLIT_STREAM = 0x50_4D_41
@@ -81,7 +81,7 @@ class SomaFamily(ProblemFamily):
 
         Args:
             collapse: ``"cubes"`` (the paper's rule), ``"strict"`` or ``"rigid"``.
-            pictures: style of the observation, ``"clean"`` or ``"varied"``.
+            pictures: style of the observation, ``"clean"``, ``"varied"`` or ``"cluttered"``.
             seed: of the pictures.
             removed: letters of pieces that are gone already.
             before: pairs of letters: the first must leave before the second.
@@ -171,15 +171,20 @@ class SomaFamily(ProblemFamily):
         )
 
     def numbers(self, part: str = "test", *, split: int = 0) -> tuple[int, ...]:
-        """Numbers of the cubes of a part: a random half each for ``"train"`` and ``"test"``; ``"all"`` is all."""
+        """Numbers of the cubes of a part: a random half each for ``"train"`` and ``"test"``; ``"all"`` is all.
+
+        Of the training half 20 are to ``"choose"`` settings by, 100 to ``"learn"`` from meanwhile.
+        """
         total = len(solutions())
         if part == "all":
             return tuple(range(total))
         order = np.random.default_rng([_SPLIT_STREAM, split]).permutation(total)
-        halves = {"train": order[:N_TRAIN], "test": order[N_TRAIN:]}
+        train: list[int] = order[:N_TRAIN].tolist()
+        halves: dict[str, list[int]] = {"train": train, "test": order[N_TRAIN:].tolist()}
+        halves |= {own: [n for n in train if n in part_to_choose(train, own)] for own in ("learn", "choose")}
         if part not in halves:
             raise UnknownNameError("part", part, ["all", *halves])
-        return tuple(sorted(map(int, halves[part])))
+        return tuple(sorted(halves[part]))
 
     def problems(self, part: str = "test", *, split: int = 0, **options: Any) -> list[Problem]:
         """The cubes of a part, with the options of `problem`."""

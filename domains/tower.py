@@ -51,8 +51,8 @@ class TowerFamily(ProblemFamily):
         Args:
             variant: ``"colours"`` (720 towers of 3 x 2 colours), ``"unique"`` (720 of six colours) or ``"heights"``
                 (1,950 of two to six levels).
-            pictures: ``"easy"`` or ``"hard"`` (also ``"clean"``, ``"varied"``): how untidily the reference is built
-                and pictured, see `domains.tower_pictures`.
+            pictures: ``"easy"``, ``"hard"`` (also ``"clean"``, ``"varied"``) or ``"cluttered"``: how untidily the
+                reference is built and pictured, see `domains.tower_pictures`.
             seed: of the pictures and the untidiness.
             offsets: float64 (n_levels, 2), how far off the plumb line each level lies along x and y, in edges of a
                 block; None draws them as `pictures` says.
@@ -123,7 +123,8 @@ class TowerFamily(ProblemFamily):
     ) -> tuple[int, ...]:
         """Numbers of the towers of a part, in random order, so that the first n are a random sample.
 
-        Two thirds are ``"train"``, the others ``"test"``; ``"all"`` is all of the variant, in order.
+        Two thirds are ``"train"``, the others ``"test"``; ``"all"`` is all of the variant, in order. ``"train"`` falls
+        into ``"learn"`` and ``"choose"``, what settings are chosen by.
 
         `by`: ``"tower"``: the parts share no tower; ``"sequence"``: no colour sequence either.
         """

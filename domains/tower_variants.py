@@ -13,11 +13,13 @@ import numpy as np
 
 from domains.tower_blocks import COLOURS, Block
 from neurosym.errors import InputError, UnknownNameError
+from neurosym.language.problem_family import part_to_choose
 from neurosym.support.arrays import Truths
 
 VARIANTS = ("colours", "unique", "heights")
 #: Levels of the tallest tower.
 TALLEST = 6
+PARTS = ("all", "train", "learn", "choose", "test")
 #: What a split divides: towers, or colour sequences (then no sequence is in both parts).
 DIVIDED = ("tower", "sequence")
 #: Two thirds to train, as in the paper (200 of 300).
@@ -67,14 +69,16 @@ def colours_of(variant: str, number: int) -> tuple[str, ...]:
 def split_numbers(variant: str, part: str, split: int, by: str) -> tuple[int, ...]:
     """Numbers of the towers of a part, ``"train"``, ``"test"`` or ``"all"``, in random order ("all" in their own).
 
+    ``"train"`` falls into ``"learn"`` and ``"choose"``, see `ProblemFamily.problems`.
+
     `split`: which random split. A tower of `heights` that is one of `colours` too is in the same part of both. `by`:
     ``"tower"`` deals out towers, ``"sequence"`` colour sequences with all their towers. Raises UnknownNameError: no
     such variant, part or way to divide; InputError: a split below 0.
     """
     if by not in DIVIDED:
         raise UnknownNameError("way to split", by, DIVIDED)
-    if part not in ("all", "train", "test"):
-        raise UnknownNameError("part", part, ("all", "train", "test"))
+    if part not in PARTS:
+        raise UnknownNameError("part", part, PARTS)
     if split < 0:
         raise InputError(f"Expected the number of a split, 0 or more; got {split}.")
     total = len(towers(variant))
@@ -83,7 +87,12 @@ def split_numbers(variant: str, part: str, split: int, by: str) -> tuple[int, ..
     to_train = _trains(variant, split, by)
     rng = np.random.default_rng([_ORDER_STREAM, VARIANTS.index(variant), DIVIDED.index(by), split])
     order = rng.permutation(total)
-    return tuple(order[to_train[order] == (part == "train")].tolist())
+    numbers: list[int] = order[to_train[order] == (part != "test")].tolist()
+    if part in ("learn", "choose"):
+        ids = {n: sequence_numbers(variant)[n] if by == "sequence" else n for n in numbers}
+        chosen = part_to_choose(list(ids.values()), part)
+        numbers = [n for n in numbers if ids[n] in chosen]
+    return tuple(numbers)
 
 
 @cache

@@ -32,6 +32,10 @@ class Encoder(nn.Module, ABC):
     def prepare(self, pictures: Tensor) -> Tensor:
         """uint8 (B, V, H, W, 3) -> whatever `forward` takes, first axis B; no picture depends on its neighbours."""
 
+    def reduced(self, pictures: Tensor) -> Tensor:
+        """uint8 (B, V, H, W, 3) -> the same with as many pixels as changes of them need before `prepare` has them."""
+        return pictures
+
     @abstractmethod
     def forward(self, prepared: Tensor) -> Tensor:
         """What `prepare` gave -> float (B, out_features)."""
@@ -52,6 +56,8 @@ class SmallEncoder(Encoder):
     """
 
     SIDE = 16
+    #: Of a square view where pictures are changed by chance: at 64 that would take four times as long.
+    CHANGED: ClassVar[int] = 32
 
     def __init__(
         self, shape: PictureShape, *, hidden: int = 192, view: int = 96, out_features: int = 256, dropout: float = 0.2
@@ -66,6 +72,11 @@ class SmallEncoder(Encoder):
             nn.Dropout(dropout), nn.Linear(views * view, out_features), nn.ReLU(), nn.Dropout(dropout)
         )
 
+    def reduced(self, pictures: Tensor) -> Tensor:
+        rows, columns = (min(self.CHANGED * n, s) for n, s in zip((self.down, self.across), pictures.shape[2:4]))
+        pooled = _pooled(pictures.flatten(0, 1), rows, columns).round().to(torch.uint8)
+        return pooled.reshape(*pictures.shape[:2], rows, columns, 3)
+
     def prepare(self, pictures: Tensor) -> Tensor:
         pooled = _pooled(pictures.flatten(0, 1), self.SIDE * self.down, self.SIDE * self.across)
         squares = pooled.reshape(-1, self.down, self.SIDE, self.across, self.SIDE, 3).transpose(2, 3)
@@ -77,6 +88,27 @@ class SmallEncoder(Encoder):
 
     def places(self, prepared: Tensor) -> Tensor:
         return prepared.reshape(len(prepared), *self.places_shape)
+
+
+class ConvEncoder(SmallEncoder):
+    """As the small one, but two convolutions look at 32 x 32 places of each view before the perceptrons.
+
+    They need not learn a colour at every place by itself: of pictures that are changed by chance they learn more.
+    """
+
+    SIDE = 32
+    CHANNELS = 16, 32
+
+    def __init__(self, shape: PictureShape, *, view: int = 96, out_features: int = 256, dropout: float = 0.1) -> None:
+        super().__init__(shape, hidden=1, view=view, out_features=out_features, dropout=dropout)
+        near, far = self.CHANNELS
+        layers = nn.Conv2d(3, near, 3, 2, padding=1), nn.ReLU(), nn.Conv2d(near, far, 3, 2, padding=1), nn.ReLU()
+        self.each = nn.Sequential(*layers, nn.Flatten(), nn.Linear(far * (self.SIDE // 4) ** 2, view), nn.ReLU())
+
+    def forward(self, prepared: Tensor) -> Tensor:
+        views = prepared.reshape(-1, self.SIDE, self.SIDE, 3).permute(0, 3, 1, 2)
+        features: Tensor = self.all(self.each(views).reshape(len(prepared), -1))
+        return features
 
 
 class _Stacked(Encoder):
@@ -188,7 +220,12 @@ def _pooled(views: Tensor, rows: int, columns: int) -> Tensor:
 #: A factory takes the picture shape and gives an encoder.
 EncoderFactory = Callable[[PictureShape], Encoder]
 
-_ENCODERS: dict[str, EncoderFactory] = {"small": SmallEncoder, "paper": PaperEncoder, "resnet18": ResNetEncoder}
+_ENCODERS: dict[str, EncoderFactory] = {
+    "small": SmallEncoder,
+    "conv": ConvEncoder,
+    "paper": PaperEncoder,
+    "resnet18": ResNetEncoder,
+}
 
 
 def register_encoder(name: str, factory: EncoderFactory) -> None:

@@ -113,18 +113,29 @@ class GlimpseHead(nn.Module):
     A glimpse is soft attention that is separable (weights over views times weights over rows times weights over
     columns), after Gregor et al., "DRAW" (ICML 2015), without its filters' shape.
 
+    `context` numbers that the whole picture tells may be read with all glimpses: light of another colour shows there.
+
     Shapes: features (B, F) and places (B, V, R, C, channels) -> (B, T, N); `width` neurons share the reading.
     """
 
     def __init__(
-        self, features: int, places: tuple[int, int, int, int], n_steps: int, n_actions: int, *, width: int = 64
+        self,
+        features: int,
+        places: tuple[int, int, int, int],
+        n_steps: int,
+        n_actions: int,
+        *,
+        width: int = 64,
+        context: int = 0,
     ) -> None:
         super().__init__()
         self.n_steps, self.axes = n_steps, places[:3]
         self.where = nn.Linear(features, n_steps * GLIMPSES * sum(self.axes))
         nn.init.normal_(self.where.bias, std=SPREAD / SHARPNESS)
         self.see = nn.Sequential(nn.Linear(places[3], _SEEING), nn.ReLU(), nn.Linear(_SEEING, _SEEING), nn.ReLU())
-        self.read = nn.Sequential(nn.Linear(_SEEING * GLIMPSES, width), nn.ReLU(), nn.Linear(width, n_actions))
+        self.context = nn.Linear(features, context) if context else None
+        seen = _SEEING * GLIMPSES + context
+        self.read = nn.Sequential(nn.Linear(seen, width), nn.ReLU(), nn.Linear(width, n_actions))
 
     def forward(self, features: Tensor, places: Tensor) -> Tensor:
         looks = SHARPNESS * self.where(features).unflatten(1, (self.n_steps * GLIMPSES, sum(self.axes)))
@@ -134,7 +145,11 @@ class GlimpseHead(nn.Module):
         rows_of = (view[..., None] * row[:, :, None]).flatten(2)  # (B, G, V R)
         blended = rows_of @ seen.flatten(3).flatten(1, 2)  # (B, G, C D)
         glimpses = column[:, :, None] @ blended.unflatten(2, (self.axes[2], _SEEING))  # (B, G, 1, D)
-        logits: Tensor = self.read(glimpses.flatten(1).unflatten(1, (self.n_steps, GLIMPSES * _SEEING)))
+        seen = glimpses.flatten(1).reshape(-1, self.n_steps, GLIMPSES * _SEEING)
+        if self.context is not None:
+            told = torch.tanh(self.context(features))[:, None].expand(-1, self.n_steps, -1)
+            seen = torch.cat([seen, told], dim=2)
+        logits: Tensor = self.read(seen)
         return logits
 
 

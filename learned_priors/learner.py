@@ -1,20 +1,21 @@
 """What stays on the device while a network is trained, and one update of it."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 
 import numpy as np
 import torch
 
+from learned_priors.augment import augmented
 from learned_priors.losses import cross_entropy, loss_of, targets_of
 from learned_priors.metrics import whole_order_accuracy
-from learned_priors.networks import CHUNK, Logits, NetworkConfig, OrderNetwork
+from learned_priors.networks import Logits, NetworkConfig, OrderNetwork
 from learned_priors.train_config import TrainConfig
 from neurosym.errors import InputError
 from neurosym.language.demonstrations import Demonstrations
-from neurosym.support.arrays import Numbers
+from neurosym.support.arrays import Numbers, Pixels
 
 #: Keeps the draws for dropout and Gumbel noise apart from other uses of the seed.
 _NOISE = 2
@@ -41,9 +42,10 @@ class Learner:
         self.marginals = demonstrations.marginals if config.soft else None
         marginals = None if self.marginals is None else torch.from_numpy(self.marginals)
         self.target = targets_of(torch.from_numpy(self.sequences), network.n_actions, marginals).to(device)
+        self.pictures = demonstrations.pictures
         with torch.no_grad():
-            chunks = self.network.chunks(demonstrations.pictures)
-            self.prepared = torch.cat([self.network.prepare(chunk) for chunk in chunks])
+            chunks, ready = self.network.chunks(self.pictures), self.network.encoder
+            self.kept = torch.cat([(ready.reduced if config.augment else ready.prepare)(chunk) for chunk in chunks])
 
     def update(self, index: Numbers, done: int) -> float:
         """Update number `done` (from 0) on the demonstrations at `index`; their loss, weighted by their number."""
@@ -52,7 +54,7 @@ class Learner:
         self.network.train()
         i = torch.from_numpy(index).to(self.device)
         with self._noise(done):
-            logits: Logits = self.network(self.prepared[i])
+            logits: Logits = self.network(self._seen(index))
             loss = loss_of(logits.to(torch.float32), self.target[i], self.config)
         value = float(loss.detach())
         if not math.isfinite(value):
@@ -69,7 +71,7 @@ class Learner:
         """Held-out loss and share of whole orders right."""
         i = torch.from_numpy(index).to(self.device)
         with self._noise(0):
-            logits = self._logits(i).to(torch.float32)
+            logits = self._logits(index).to(torch.float32)
             loss = float(loss_of(logits, self.target[i], self.config))
         table, length = self.network.tables(logits)
         marginals, classes = None if self.marginals is None else self.marginals[index], self.config.classes
@@ -81,20 +83,19 @@ class Learner:
     @torch.no_grad()
     def calibrate(self, index: Numbers) -> None:
         """Set the network's temperature to the one of the least cross-entropy on `index`."""
-        i = torch.from_numpy(index).to(self.device)
-        logits, target, before = self._logits(i), self.target[i].to(torch.float64), self.network.config
-
-        def loss_at(temperature: float) -> float:
-            self.network.config = replace(before, temperature=temperature)
-            return float(cross_entropy(self.network.log_prob(logits), target, self.config.classes))
-
-        best = min((before.temperature * 2 ** (k / 4) for k in range(-8, 17)), key=loss_at)
-        self.network.config = replace(before, temperature=best)
-
-    def _logits(self, index: torch.Tensor) -> Logits:
-        """The network's answers as it reads, without dropout."""
         self.network.eval()
-        return Logits.joined([self.network(self.prepared[part]) for part in torch.split(index, CHUNK)])
+        i = torch.from_numpy(index).to(self.device)
+        calibrate(self.network, self.pictures[index], self.target[i], self.config.classes)
+
+    def _logits(self, index: Numbers) -> Logits:
+        """The network's answers as it reads, without dropout, to pictures as they are."""
+        self.network.eval()
+        return read(self.network, self.pictures[index])
+
+    def _seen(self, index: Numbers) -> torch.Tensor:
+        """What is learned from: prepared pictures, changed by chance where the settings say so."""
+        kept = self.kept[torch.from_numpy(index).to(self.device)]
+        return self.network.prepare(augmented(kept, self.config.augment)) if self.config.augment else kept
 
     @contextmanager
     def _noise(self, update: int) -> Iterator[None]:
@@ -111,6 +112,27 @@ class Learner:
         with torch.random.fork_rng(devices=[self.device] if self.device.type == "cuda" else []):
             torch.manual_seed(seed)
             yield
+
+
+def read(network: OrderNetwork, pictures: Pixels) -> Logits:
+    """A network's answers to pictures, chunk by chunk."""
+    return Logits.joined([network(network.prepare(chunk)) for chunk in network.chunks(pictures)])
+
+
+@torch.no_grad()
+def calibrate(network: OrderNetwork, pictures: Pixels, target: torch.Tensor, classes: Sequence[int]) -> None:
+    """Set a network's temperature to the one of the least cross-entropy on pictures that it did not learn from.
+
+    `target`: float (M, T, N), as `targets_of` gives it. Guo et al., "On calibration of modern neural networks" (2017).
+    """
+    logits, exact, before = read(network, pictures), target.to(torch.float64), network.config
+
+    def loss_at(temperature: float) -> float:
+        network.config = replace(before, temperature=temperature)
+        return float(cross_entropy(network.log_prob(logits), exact, classes))
+
+    best = min((before.temperature * 2 ** (k / 4) for k in range(-8, 17)), key=loss_at)
+    network.config = replace(before, temperature=best)
 
 
 def learning_rate(update: int, total: int, config: TrainConfig) -> float:

@@ -62,19 +62,3 @@ def whole_order_accuracy(
     if log_length is not None:
         right &= (orders >= 0).sum(axis=1) == (sequences >= 0).sum(axis=1)
     return float(right.mean())
-
-
-def calibration_error(log_prob: ArrayLike, sequences: Numbers, *, classes: Sequence[int] = (), bins: int = 10) -> float:
-    """Expected calibration error (Guo et al., ICML 2017, eq. 3) of each step's likeliest class of actions.
-
-    The steps taken are sorted by their confidence into bins of equal width; it is the mean difference, weighted by
-    the number of steps, of confidence and share of steps right. 0 is perfect. Shapes as for `whole_order_accuracy`.
-    """
-    tables = np.asarray(log_prob, dtype=np.float64)
-    chance = np.stack([np.exp(-OrderScores(table, classes=tuple(classes)).costs) for table in tables])
-    matches = step_matches(chance.argmax(axis=2), sequences, classes)
-    taken = sequences >= 0
-    sure, right = chance.max(axis=2)[taken], matches[taken]
-    place = np.minimum((sure * bins).astype(int), bins - 1)
-    gaps = np.abs(np.bincount(place, sure, bins) - np.bincount(place, right, bins))
-    return float(gaps.sum() / max(len(place), 1))

@@ -12,6 +12,8 @@ import torch
 from numpy.typing import ArrayLike, NDArray
 
 from learned_priors.checkpoints import save_network
+from learned_priors.learner import calibrate
+from learned_priors.losses import targets_of
 from learned_priors.recipes import Recipe, recipe_named
 from learned_priors.train_config import TrainConfig
 from learned_priors.trained_network import TrainedNetwork
@@ -155,6 +157,7 @@ class NetworkPrior(Prior):
         resume: bool = True,
         config: TrainConfig | None = None,
         settings: Mapping[str, Any] | None = None,
+        start: str | Path | None = None,
     ) -> Self:
         """Train a network on demonstrations; this prior then reads with it. Returns itself.
 
@@ -168,6 +171,7 @@ class NetworkPrior(Prior):
             config: instead of the recipe's `TrainConfig`.
             settings: fields of the `TrainConfig` to change, ``{"epochs": 25, "rate": 4e-3}``; `epochs` goes before.
                 Besides, ``"head"`` and ``"width"`` of the network.
+            start: weights of this recipe, of the same actions, to go on from instead of chance ones.
         """
         if device is not None:
             self.device = self._weights.device = _checked_device(device)
@@ -175,6 +179,10 @@ class NetworkPrior(Prior):
             demonstrations, encoder=self.encoder or "small", epochs=epochs, config=config, settings=settings
         )
         kept = Path(checkpoint) if checkpoint else None
+        known = self._weights.load(Path(start)) if start else None
+        actions = list(demonstrations.actions)
+        if known and (known.header["actions"], known.network.config.shape) != (actions, given.shape):
+            raise InputError(f"Expected weights of the same network and actions to start from; {start} has others.")
         network, figures = fit(
             demonstrations,
             given,
@@ -184,6 +192,7 @@ class NetworkPrior(Prior):
             progress=progress,
             checkpoint=kept,
             resume=resume,
+            start=known.network if known else None,
         )
         header = {
             "prior": self.recipe.name,
@@ -194,6 +203,22 @@ class NetworkPrior(Prior):
         }
         classes = {"classes": list(demonstrations.classes)} if demonstrations.classes else {}
         self._weights.own = TrainedNetwork(network, {**header, **classes})
+        return self
+
+    def calibrate(self, demonstrations: Demonstrations) -> Self:
+        """Set how sure the scores are by demonstrations that were not learned from. Returns itself.
+
+        The logits are divided by the temperature of the least cross-entropy (Guo et al., ICML 2017); which order is the
+        likeliest hardly changes. The temperature is in the header that `save` writes.
+        """
+        own = self._weights.own
+        if own is None:
+            raise InputError("Expected a prior that was trained, or given weights; this one has none. Call fit first.")
+        marginals = None if demonstrations.marginals is None else torch.from_numpy(demonstrations.marginals)
+        target = targets_of(torch.from_numpy(demonstrations.sequences), own.network.config.n_actions, marginals)
+        calibrate(own.network, demonstrations.pictures, target.to(self.device), own.classes)
+        header = {**own.header, "network": own.network.config.to_json()}
+        self._weights.own = TrainedNetwork(own.network, header)
         return self
 
     def save(self, path: str | Path, *, notes: Mapping[str, Any] | None = None) -> Path:

@@ -4,7 +4,7 @@ where tasks differ in length, something that tells the number of steps."""
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
@@ -56,6 +56,8 @@ class NetworkConfig:
         stop: what tells how many of the T steps a task takes. "none": all of them; "head": a layer on the features of
             the one encoder; "network": a network of its own, with an encoder of its own (the paper's, Sec. IV-B);
             "class": one more action, to stop, at every step (the paper's extension of its temporal network).
+        context: numbers that each glimpse is read with, told by the whole picture: what light of another colour does to
+            a place, the place alone does not tell.
         spare_rows: rows beyond the T steps, which learn to stop and are not read.
     """
 
@@ -70,9 +72,15 @@ class NetworkConfig:
     stop: Stop = "none"
     iterations: int | None = None
     spare_rows: int = 0
+    context: int = 0
 
     def to_json(self) -> dict[str, Any]:
         return {**asdict(self), "picture_shape": list(self.picture_shape)}
+
+    @property
+    def shape(self) -> NetworkConfig:
+        """The same, but for what only reading takes: networks that agree in it have weights of the same shapes."""
+        return replace(self, temperature=1.0, iterations=None)
 
     @classmethod
     def from_json(cls, given: Mapping[str, Any]) -> NetworkConfig:
@@ -88,8 +96,8 @@ class NetworkConfig:
                 raise ValueError(f"unknown stop {config.stop!r}, or a stop class that is not decoded by rows")
             if config.iterations is not None and (type(config.iterations) is not int or config.iterations < 1):
                 raise ValueError(f"iterations are to be a positive integer or null: {config.iterations!r}")
-            if type(config.spare_rows) is not int or config.spare_rows < 0:
-                raise ValueError(f"spare rows are to be a number, 0 or more: {config.spare_rows!r}")
+            if not all(type(n) is int and n >= 0 for n in (config.spare_rows, config.context)):
+                raise ValueError("spare rows and context are to be numbers, 0 or more")
             if config.n_steps > config.n_actions or not config.temperature > 0:
                 raise ValueError("more steps than actions, or a temperature that is not positive")
         except (TypeError, KeyError, ValueError) as error:
@@ -140,7 +148,8 @@ class OrderNetwork(nn.Module):
             blocks = config.n_steps + (config.stop == "class")
             self.head = PublishedTemporalDecoder(features, steps, columns, width=width, blocks=blocks)
         elif config.head == "glimpses":
-            self.head = GlimpseHead(features, self.encoder.places_shape, steps, columns, width=width)
+            places, context = self.encoder.places_shape, config.context
+            self.head = GlimpseHead(features, places, steps, columns, width=width, context=context)
         else:
             layers = nn.Linear(features, width), nn.ReLU(), nn.Linear(width, steps * columns)
             self.head = nn.Sequential(*layers, nn.Unflatten(1, (steps, columns)))

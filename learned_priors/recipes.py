@@ -9,6 +9,9 @@ from learned_priors.train_config import TrainConfig
 from neurosym.errors import InputError, UnknownNameError
 from neurosym.language.demonstrations import Demonstrations
 
+#: Numbers that glimpses are read with where pictures are changed by chance, their light too.
+CONTEXT = 16
+
 
 @dataclass(frozen=True)
 class Variant:
@@ -80,6 +83,7 @@ class Recipe:
             width=neurons,
             temperature=train.temperature if self.decoding == "sinkhorn" else 1.0,
             stop=self.stop if shortest < n_steps else "none",
+            context=CONTEXT if head == "glimpses" and train.augment else 0,
             spare_rows=n_actions + 1 - n_steps if head == "tcn-published" and shortest < n_steps else 0,
             iterations=train.iterations if self.decoding == "sinkhorn" and n_steps < n_actions else None,
         )

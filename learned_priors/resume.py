@@ -36,8 +36,14 @@ class RunState:
     best: dict[str, Tensor] = field(default_factory=dict)
 
 
-def fingerprint(demonstrations: Demonstrations, network: NetworkConfig, config: TrainConfig, seed: int) -> str:
-    """What must agree for a run to go on: the demonstrations, the network, the settings and the seed."""
+def fingerprint(
+    demonstrations: Demonstrations,
+    network: NetworkConfig,
+    config: TrainConfig,
+    seed: int,
+    start: OrderNetwork | None = None,
+) -> str:
+    """What must agree for a run to go on: demonstrations, network, settings, seed, and the weights it began with."""
     settings = {k: v for k, v in config.to_json().items() if k != "checkpoint_seconds"}
     text = json.dumps([network.to_json(), settings, seed, demonstrations.actions], sort_keys=True)
     digest = hashlib.blake2b(text.encode(), digest_size=16)
@@ -46,6 +52,8 @@ def fingerprint(demonstrations: Demonstrations, network: NetworkConfig, config: 
         if array is not None:
             digest.update(str((array.dtype, array.shape)).encode())
             digest.update(np.ascontiguousarray(array).data)
+    for tensor in start.state_dict().values() if start else ():
+        digest.update(tensor.cpu().numpy().tobytes())
     return digest.hexdigest()
 
 

@@ -37,6 +37,8 @@ class TrainConfig:
         patience: stop when the held-out loss has not improved for so many epochs; None never stops early.
         calibrate: divide the logits by the temperature that suits what is held out best (Guo et al., ICML 2017), if
             anything is held out. It changes how sure the network is, hardly which order it prefers.
+        augment: how much pictures are changed by chance at every update, 0 (not at all) to 1, see
+            `learned_priors.augment`.
         precision: "float32" or "bfloat16" (autocast; pays for convolutions on hardware made for it).
         checkpoint_seconds: least time between two checkpoints, if one is asked for.
     """
@@ -62,6 +64,7 @@ class TrainConfig:
     keep: Literal["last", "best"] = "last"
     patience: int | None = None
     calibrate: bool = False
+    augment: float = 0.0
     precision: Literal["float32", "bfloat16"] = "float32"
     checkpoint_seconds: float = 5.0
 

@@ -51,6 +51,7 @@ def fit(
     progress: Callable[[FitProgress], None] | None = None,
     checkpoint: Path | None = None,
     resume: bool = True,
+    start: OrderNetwork | None = None,
 ) -> tuple[OrderNetwork, dict[str, Any]]:
     """Train a network on demonstrations.
 
@@ -60,6 +61,7 @@ def fit(
             saved costs nothing: delete it then.
         resume: go on from `checkpoint` if it is there. One of another run (other demonstrations, settings or seed)
             raises `CheckpointError`.
+        start: a network of the same shape, whose weights are gone on from instead of chance ones.
 
     Returns:
         The network, its weights rounded to float16 values, and what its header will say of the training.
@@ -83,8 +85,10 @@ def fit(
         epochs = max(1, min(epochs, config.most_steps // steps_per_epoch))
     epochs = max(epochs, math.ceil(config.least_steps / steps_per_epoch))
     run = Learner(demonstrations, network, config, seed, torch.device(device), steps_per_epoch * epochs)
+    if start is not None:
+        run.network.load_state_dict(start.state_dict())
     state = RunState()
-    mark = fingerprint(demonstrations, network, config, seed) if checkpoint else ""
+    mark = fingerprint(demonstrations, network, config, seed, start) if checkpoint else ""
     if checkpoint and resume and checkpoint.exists():
         state = load_state(checkpoint, mark, run.network, run.optimizer)
 

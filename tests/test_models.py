@@ -15,7 +15,7 @@ import torch
 from learned_priors.encoders import ResNetEncoder, build_encoder
 from learned_priors.heads import log_length_of_stops
 from learned_priors.losses import cross_entropy, loss_of, squared_error_of_numbers, targets_of
-from learned_priors.metrics import calibration_error, decoded, step_matches, whole_order_accuracy
+from learned_priors.metrics import decoded, step_matches, whole_order_accuracy
 from learned_priors.network_prior import NetworkPrior
 from learned_priors.networks import Logits, NetworkConfig, OrderNetwork
 from learned_priors.recipes import RECIPES
@@ -23,7 +23,7 @@ from learned_priors.sinkhorn import log_sinkhorn
 from learned_priors.train_config import TrainConfig
 from learned_priors.training import FitProgress
 from neurosym.errors import CheckpointError, DemonstrationError, InputError, MissingDependencyError
-from neurosym.experiments.order_accuracy import compare_orders
+from neurosym.experiments.order_accuracy import calibration_error, compare_orders
 from neurosym.language.demonstrations import Demonstrations
 from neurosym.planning.order_scores import OrderScores
 from neurosym.registry import load_prior
@@ -372,20 +372,23 @@ def test_the_full_recipe_is_calibrated() -> None:
     errors = {}
     for calibrate in (False, True):
         prior = trained("sinkhorn", learn, held_out=0.2, calibrate=calibrate)
-        tables = np.stack([s.log_prob for s in prior.read(test.pictures)])
-        chance = np.exp([-s.costs for s in prior.read(test.pictures)])
+        scores = prior.read(test.pictures)
+        chance = np.exp([-s.costs for s in scores])
         matches = step_matches(chance.argmax(axis=2), test.sequences, test.classes)
         assert 0.5 < matches.mean() < 0.95, "neither hopeless nor sure, or this shows nothing"
-        errors[calibrate] = calibration_error(tables, test.sequences, classes=test.classes)
+        right = targets_of(torch.from_numpy(test.sequences), len(test.actions)).numpy()
+        errors[calibrate] = calibration_error(scores, list(right))
     assert errors[True] < 0.06 < errors[False]
 
 
 def test_the_calibration_error_of_known_tables() -> None:
-    sure = np.log(np.tile([[[0.7, 0.3]]], (10, 1, 1)))
-    right = np.array([[0]] * 7 + [[1]] * 3)
+    table = np.log([[0.7, 0.3]])
+    sure, alike = [OrderScores(table)] * 10, [OrderScores(table, classes=(1, 1))] * 10
+    right = [np.eye(2)[[0]]] * 7 + [np.eye(2)[[1]]] * 3
     assert calibration_error(sure, right) == pytest.approx(0.0, abs=1e-9)
-    assert calibration_error(sure, np.zeros((10, 1), dtype=np.int64)) == pytest.approx(0.3)
-    assert calibration_error(sure, right, classes=(1, 1)) == pytest.approx(0.0, abs=1e-9)
+    assert calibration_error(sure, [np.eye(2)[[0]]] * 10) == pytest.approx(0.3)
+    assert calibration_error(sure, [np.exp(table)] * 10) == pytest.approx(0.0, abs=1e-9), "many orders are right"
+    assert calibration_error(alike, right) == pytest.approx(0.0, abs=1e-9)
 
 
 # Early stopping

@@ -8,6 +8,7 @@ import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from enum import StrEnum
 from pathlib import Path
 from threading import Timer
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -29,7 +30,9 @@ if TYPE_CHECKING:
     from neurosym.geometry.readers.references import Reading
     from neurosym.language.problem import Problem
 
-Style = Literal["clean", "varied"]
+Style = Literal["clean", "varied", "cluttered"]
+#: Typer takes a list of these, and none of literals.
+PictureStyles = StrEnum("PictureStyles", ["clean", "varied", "cluttered"])
 DomainName = Annotated[str, typer.Argument(metavar="DOMAIN", help="Problem family; `neurosym list` names them.")]
 PriorNames = Annotated[
     list[str] | None, typer.Option(metavar="Q", help="Name of a prior, a weights file, or `none`. May be repeated.")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from neurosym.commands import common
-from neurosym.errors import InputError
+from neurosym.errors import InputError, UnknownNameError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -51,8 +51,24 @@ def train(
     ] = None,
     split: common.Split = 0,
     seed: Annotated[int, typer.Option(min=0, metavar="K", help="Of the pictures and the training.")] = 0,
-    pictures: common.PictureStyle = "clean",
+    pictures: Annotated[
+        list[common.PictureStyles] | None, typer.Option(help="Style of the pictures; may be repeated. Default clean.")
+    ] = None,
+    part: Annotated[
+        str,
+        typer.Option(metavar="train|learn", help="learn: a sixth of train is kept, and the scores calibrated by it."),
+    ] = "train",
+    calibrate: Annotated[
+        list[common.PictureStyles] | None,
+        typer.Option(help="Styles by which scores are calibrated; may be repeated. Default, for learn, --pictures."),
+    ] = None,
+    setting: Annotated[
+        list[str] | None, typer.Option(metavar="KEY=VALUE", help="Of the training: augment=1. May be repeated.")
+    ] = None,
     epochs: Annotated[int | None, typer.Option(min=1, help="Default the recipe's.")] = None,
+    start: Annotated[
+        Path | None, typer.Option("--from", metavar="FILE", help="Weights to go on from, of the same prior.")
+    ] = None,
     encoder: Annotated[
         str | None, typer.Option(metavar="NAME", help="small (default) or paper, the paper's CNN.")
     ] = None,
@@ -68,8 +84,13 @@ def train(
 
     _check_suffix(out, ".safetensors")
     load_domain(domain)
-    if demos_file is not None and (split or option or pictures != "clean"):
-        raise InputError("Expected --split, --pictures and --option only without --demos, whose file has it all.")
+    if demos_file is not None and (split or option or pictures or calibrate or part != "train"):
+        raise InputError(
+            "Expected --split, --pictures, --part, --calibrate, --option only without --demos, whose file has it all."
+        )
+    if part not in ("train", "learn"):
+        raise UnknownNameError("part to learn from", part, ("train", "learn"))
+    styles: list[Any] = [style.value for style in pictures or ()] or ["clean"]
     learner: Any = load_prior(prior, **({"encoder": encoder} if encoder else {}))
     if not (hasattr(learner, "fit") and hasattr(learner, "save")):
         raise InputError(f"Expected a prior that can be trained; {prior!r} cannot (it has no fit and save).")
@@ -79,22 +100,37 @@ def train(
         given = Demonstrations.load(demos_file)
     else:
         recipe = getattr(learner, "labels", "full")
-        given = _demonstrations(domain, "train", split, recipe, pictures, seed, common.family_options(option))
+        options = common.family_options(option)
+
+        def shown(part: str, styles: list[Any]) -> Demonstrations:
+            parts = [_demonstrations(domain, part, split, recipe, style, seed, options) for style in styles]
+            return type(parts[0]).joined(parts)
+
+        given = shown(part, styles)
     checkpoint = out.with_suffix(".checkpoint")
     if checkpoint.exists():
         common.say(f"Going on from {checkpoint}." if resume else f"Starting over; {checkpoint} is replaced.")
     out.parent.mkdir(parents=True, exist_ok=True)
     with warnings.catch_warnings():
         warnings.showwarning = lambda message, *_, **__: common.say(f"Note: {message}")
-        settings = common.taken_by(learner.fit, {"settings": {"held_out": held_out}} if held_out else {})
-        _fit(learner, given, seed=seed, epochs=epochs, device=device, checkpoint=checkpoint, resume=resume, **settings)
-    made_here = {"split": split, "pictures": pictures, "seed": seed, **common.family_options(option)}
+        settings = {**({"held_out": held_out} if held_out else {}), **common.family_options(setting)}
+        given_of = {name: value for name, value in (("settings", settings), ("start", start)) if value}
+        more = common.taken_by(learner.fit, given_of)
+        _fit(learner, given, seed=seed, epochs=epochs, device=device, checkpoint=checkpoint, resume=resume, **more)
+    made_here = {"split": split, "part": part, "pictures": "+".join(styles), "seed": seed}
+    if by := [style.value for style in calibrate or ()] or (styles if part == "learn" else []):
+        learner.calibrate(shown("choose", by))
+        made_here["calibrated"] = "+".join(by)
+    made_here |= common.family_options(option)
     learner.save(out, notes=made_here if demos_file is None else {"file": demos_file.name})
     checkpoint.unlink(missing_ok=True)
     figures = learner.header.get("training", {}) if hasattr(learner, "header") else {}
     took = f" in {figures['seconds']:.1f} s" if "seconds" in figures else ""
     print(f"{out}: {prior}, trained on {len(given)} demonstrations{took}, {out.stat().st_size / 1024:.0f} KiB")
-    problems = load_domain(domain).problems("test", split=split, **common.family_options(option))[:WORTH]
+    family = load_domain(domain)
+    # Of the options some say which demonstrations, not which problems.
+    asked = common.taken_by(family.problem, common.family_options(option))
+    problems = family.problems("test", split=split, **asked)[:WORTH]
     common.say(worth(learner, problems))
 
 

@@ -4,21 +4,13 @@ import os
 import sys
 from contextlib import redirect_stdout
 from dataclasses import replace
-from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import typer
 
-from neurosym.commands.common import progress_bar, say
+from neurosym.commands.common import PictureStyles, progress_bar, say
 from neurosym.errors import UnknownNameError
-
-
-class Pictures(StrEnum):
-    """Style of pictures: typer takes a list of these, and none of literals."""
-
-    clean = "clean"
-    varied = "varied"
 
 
 def reproduce(
@@ -26,7 +18,7 @@ def reproduce(
         str,
         typer.Argument(
             metavar="NAME",
-            help="soma, soma-published, tower, tower-easy, tower-by-sequence, unseen, variable or scrabble.",
+            help="soma, soma-published, tower, tower-easy, tower-by-sequence, unseen, variable, scrabble, robustness.",
         ),
     ],
     seeds: Annotated[int | None, typer.Option(min=1, metavar="K", help="Splits and trainings, 0 to K - 1.")] = None,
@@ -43,7 +35,9 @@ def reproduce(
     address: Annotated[
         str | None, typer.Option(metavar="HOST:PORT", help="Of the Ray cluster. Default the one on this machine.")
     ] = None,
-    pictures: Annotated[list[Pictures] | None, typer.Option(help="soma: style; may be repeated. Default both.")] = None,
+    pictures: Annotated[
+        list[PictureStyles] | None, typer.Option(help="soma: style; may be repeated. Default clean and varied.")
+    ] = None,
     prior: Annotated[
         list[str] | None, typer.Option(metavar="Q", help="What is trained; may be repeated. Default all.")
     ] = None,
@@ -59,16 +53,21 @@ def reproduce(
     """
     # Before any network's library starts its threads: as many here as in workers, so that figures agree.
     os.environ.setdefault("OMP_NUM_THREADS", "1")
-    from neurosym.experiments import imitation
+    from neurosym.experiments import imitation, robustness
     from neurosym.experiments import reproduce as planning
 
     folder = out or Path("out") / f"reproduce-{name}{'' if scale == 'quick' else f'-{scale}'}"
     given: dict[str, Any] = {"workers": workers, "engine": engine, "address": address, "say": say}
-    if name not in (*planning.SOMA_EXPERIMENTS, *imitation.study_names()):
-        raise UnknownNameError("experiment", name, [*planning.SOMA_EXPERIMENTS, *imitation.study_names()])
+    names = (*planning.SOMA_EXPERIMENTS, *imitation.study_names(), robustness.NAME)
+    if name not in names:
+        raise UnknownNameError("experiment", name, names)
     # Ray says on stdout that a node is lost; stdout belongs to the answer.
     with redirect_stdout(sys.stderr):
-        if name in planning.SOMA_EXPERIMENTS:
+        if name == robustness.NAME:
+            with progress_bar("priors") as progress:
+                where = {name: value for name, value in given.items() if name != "say"}
+                page = robustness.report(robustness.reproduce(folder, progress=progress, **where))
+        elif name in planning.SOMA_EXPERIMENTS:
             what = planning.soma_experiment(scale, name)
             styles = tuple(style.value for style in pictures or ()) or what.styles
             what = replace(what, splits=seeds or what.splits, styles=styles, methods=tuple(prior or what.methods))

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from neurosym.errors import InputError
 from neurosym.language.demonstrations import Demonstrations
+from neurosym.planning.order_scores import OrderScores
 from neurosym.support.arrays import Array, Numbers, Truths
 
 
@@ -67,6 +68,28 @@ def averages(figures: Mapping[str, Array], seen: Truths) -> dict[str, float]:
             for metric in ("whole_sequence", "per_step"):
                 means[f"{metric}_{label}"] = float(figures[metric][chosen].mean())
     return means
+
+
+def calibration_error(scores: Sequence[OrderScores], shares: Sequence[Array], *, bins: int = 10) -> float:
+    """Expected calibration error (Guo et al., ICML 2017, eq. 3) of each step's likeliest class of actions.
+
+    The steps taken are sorted by their confidence into bins of equal width; it is the mean difference, weighted by
+    the number of steps, of confidence and share of steps right. 0 is perfect.
+
+    `shares`: for each of the `scores` float64 (steps, actions), the share of valid orders that have each action at each
+    step (one-hot where one order is right); rows of zeros, or missing ones, are steps not taken.
+    """
+    sure, right = [], []
+    for own, share in zip(scores, shares, strict=True):
+        taken = np.flatnonzero(share.sum(axis=1) > 0)
+        likeliest = own.costs[taken].argmin(axis=1)
+        alike = np.asarray(own.classes) == np.asarray(own.classes)[likeliest][:, None]
+        sure.append(np.exp(-own.costs[taken, likeliest]))
+        right.append((share[taken] * alike).sum(axis=1))
+    confidence, truth = np.concatenate(sure), np.concatenate(right)
+    place = np.minimum((confidence * bins).astype(int), bins - 1)
+    gaps = np.abs(np.bincount(place, confidence, bins) - np.bincount(place, truth, bins))
+    return float(gaps.sum() / max(len(place), 1))
 
 
 @dataclass(frozen=True, eq=False)

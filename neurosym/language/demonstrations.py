@@ -6,6 +6,7 @@ Stored as ``.npz`` without pickle. Shapes: M demonstrations, V views of H x W pi
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -86,6 +87,23 @@ class Demonstrations:
         return Demonstrations(
             self.pictures[i], self.sequences[i], self.actions, marginals, self.groups[i], self.domain, self.classes
         )
+
+    @classmethod
+    def joined(cls, parts: Sequence[Demonstrations]) -> Demonstrations:
+        """One after the other: other pictures of the same kind of work, with the same actions.
+
+        Raises `DemonstrationError` where actions, classes or shapes differ, or some have shares of valid orders only.
+        """
+        first = parts[0]
+        for other in parts[1:]:
+            same = other.actions == first.actions and other.classes == first.classes
+            shapes = other.pictures.shape[1:], other.sequences.shape[1:], other.marginals is None
+            if not same or shapes != (first.pictures.shape[1:], first.sequences.shape[1:], first.marginals is None):
+                raise DemonstrationError("Expected demonstrations of the same actions and shapes to join; got others.")
+        arrays = [np.concatenate([getattr(p, name) for p in parts]) for name in ("pictures", "sequences", "groups")]
+        shares = [p.marginals for p in parts if p.marginals is not None]
+        marginals = np.concatenate(shares) if shares else None
+        return cls(arrays[0], arrays[1], first.actions, marginals, arrays[2], first.domain, first.classes)
 
     def save(self, path: str | Path) -> Path:
         """Write ``.npz``: to a temporary file first, then renamed, so that a kill leaves no half file."""

@@ -18,6 +18,17 @@ if TYPE_CHECKING:
     from neurosym.language.problem import Problem
 
 
+#: Share of what is to train that is kept for choosing settings.
+CHOOSE_SHARE = 1 / 6
+
+
+def part_to_choose(ids: Sequence[int], part: str) -> set[int]:
+    """Of what is to train, in its order: the last sixth is to ``"choose"`` settings by, the others to ``"learn"``."""
+    different = list(dict.fromkeys(ids))
+    first = len(different) - round(CHOOSE_SHARE * len(different))
+    return set(different[first:] if part == "choose" else different[:first])
+
+
 class ProblemFamily(Semantics, ABC):
     """What an entry point in ``neurosym.domains`` names.
 
@@ -37,7 +48,11 @@ class ProblemFamily(Semantics, ABC):
 
     @abstractmethod
     def problems(self, part: str = "test", *, split: int = 0, **options: Any) -> Sequence[Problem]:
-        """The problems of a part, ``"train"``, ``"test"`` or ``"all"``; "train" and "test" never overlap."""
+        """The problems of a part, ``"train"``, ``"test"`` or ``"all"``; "train" and "test" never overlap.
+
+        ``"train"`` falls into ``"choose"``, where settings are compared, and ``"learn"``, what is learned from
+        meanwhile: nothing needs to be chosen by what is to test.
+        """
 
     def numbers(self, part: str = "test", *, split: int = 0) -> Sequence[int]:
         """Numbers of the problems of a part, as `problem` takes them; benchmarks rebuild problems from these."""

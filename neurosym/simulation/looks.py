@@ -19,12 +19,14 @@ class Camera:
         elevation: degrees above the horizontal; 90 looks straight down (with azimuth -90, +y is up in the picture).
         distance: from the middle, in halves of the assembly's largest extent.
         field_of_view: degrees, top to bottom.
+        shift: of the picture, to the right and up, in halves of its side; what is seen keeps its perspective.
     """
 
     azimuth: float
     elevation: float
     distance: float = 8.0
     field_of_view: float = 21.0
+    shift: tuple[float, float] = (0.0, 0.0)
 
     def view_matrix(self) -> list[float]:
         """World to camera, 16 numbers by columns (OpenGL's order)."""
@@ -41,7 +43,8 @@ class Camera:
         near, far = 0.5, 2 * self.distance
         f = 1 / np.tan(np.radians(self.field_of_view) / 2)
         depth, shift = (far + near) / (near - far), 2 * far * near / (near - far)
-        P = np.array([[f, 0, 0, 0], [0, f, 0, 0], [0, 0, depth, shift], [0, 0, -1, 0]])
+        right, up = self.shift
+        P = np.array([[f, 0, -right, 0], [0, f, -up, 0], [0, 0, depth, shift], [0, 0, -1, 0]])
         return [float(x) for x in P.T.ravel()]
 
 
@@ -50,6 +53,25 @@ MARGIN = 0.06
 #: The four views of the paper: from the top (+y up in the picture), then three sides, from +x, +y and -x, raised a
 #: little. Together they see all but the bottom and the side towards -y.
 VIEWS: tuple[Camera, ...] = (Camera(-90, 90), Camera(0, 15), Camera(90, 15), Camera(180, 15))
+
+
+@dataclass(frozen=True, slots=True)
+class Clutter:
+    """What else a camera sees, and how carelessly it was set up; see `neurosym.simulation.clutter`. Drawn uniformly.
+
+    Attributes:
+        extent: share of the picture's side that the assembly takes, anywhere in the picture.
+        chance: of each thing that lies about, of an arm, and of something in front.
+        front: half sides of what is in front, in halves of the picture.
+        gain: how bright the light is (drawn on a scale of logarithms).
+        hue: share of the colour circle by which the light may turn all colours, either way.
+    """
+
+    extent: tuple[float, float] = (20 / 64, 50 / 64)
+    chance: float = 0.5
+    front: tuple[float, float] = (0.03, 0.1)
+    gain: tuple[float, float] = (0.4, 1.6)
+    hue: float = 0.12
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,6 +87,7 @@ class Style:
         hue: share of the colour circle that each part's colour may shift, either way.
         brightness: share that each part's colour may become darker or brighter.
         noise: standard deviation of pixel noise, in grey levels of 255.
+        clutter: what else is seen; None: nothing, on white.
     """
 
     light_azimuth: tuple[float, float] = (40.0, 40.0)
@@ -79,6 +102,7 @@ class Style:
     hue: float = 0.0
     brightness: float = 0.0
     noise: tuple[float, float] = (0.0, 0.0)
+    clutter: Clutter | None = None
 
     @property
     def is_random(self) -> bool:
@@ -93,22 +117,24 @@ class Style:
         )
 
 
+_VARIED = Style(
+    light_azimuth=(0.0, 360.0),
+    light_elevation=(25.0, 75.0),
+    ambient=(0.45, 0.65),
+    diffuse=(0.3, 0.55),
+    specular=(0.0, 0.2),
+    shadow=0.25,
+    azimuth=5.0,
+    elevation=4.0,
+    distance=0.05,
+    hue=0.025,
+    brightness=0.15,
+    noise=(0.0, 8.0),
+)
 STYLES: Mapping[str, Style] = {
     "clean": Style(),
-    "varied": Style(
-        light_azimuth=(0.0, 360.0),
-        light_elevation=(25.0, 75.0),
-        ambient=(0.45, 0.65),
-        diffuse=(0.3, 0.55),
-        specular=(0.0, 0.2),
-        shadow=0.25,
-        azimuth=5.0,
-        elevation=4.0,
-        distance=0.05,
-        hue=0.025,
-        brightness=0.15,
-        noise=(0.0, 8.0),
-    ),
+    "varied": _VARIED,
+    "cluttered": replace(_VARIED, distance=0.15, clutter=Clutter()),
 }
 
 

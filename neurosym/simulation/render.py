@@ -18,6 +18,7 @@ import numpy as np
 from neurosym.errors import InputError
 from neurosym.geometry.assembly import Assembly
 from neurosym.simulation.client import Client, Closeable
+from neurosym.simulation.clutter import draw_surroundings
 from neurosym.simulation.drawing import drawn, flat_shaded
 from neurosym.simulation.looks import VIEWS, Camera, Style, draw_look, style_named
 from neurosym.simulation.scene import RGB, Scene, scene_of
@@ -64,7 +65,7 @@ class PictureStudio(Closeable):
 
         Args:
             assembly: the parts, or the scene made of them (then `colours` is not asked).
-            style: ``"clean"``, ``"varied"`` or a `Style`; one that varies needs an `rng`.
+            style: ``"clean"``, ``"varied"``, ``"cluttered"`` or a `Style`; one that varies needs an `rng`.
             colours: part name -> RGB in 0..1; the default is `PALETTE` by the order of the parts.
             size: height and width in pixels.
 
@@ -83,10 +84,15 @@ class PictureStudio(Closeable):
         scene = assembly if isinstance(assembly, Scene) else scene_of(assembly, colours)
         chance = np.random.default_rng(0) if rng is None else rng
         look = draw_look(look_of, cameras, scene.colours, chance)
-        self._arrange(scene, look.colours)
+        seen, own, around = look.cameras, look.colours, None
+        if look_of.clutter is not None:
+            around = draw_surroundings(look_of.clutter, scene, seen, chance)
+            scene, seen = around.scene, around.cameras
+            own = np.concatenate([own, scene.colours[len(own) :]])
+        self._arrange(scene, own)
         pictures = np.empty((len(cameras), size, size, 3), dtype=np.uint8)
-        for i, camera in enumerate(look.cameras):
-            pictures[i], _, _ = drawn(
+        for i, camera in enumerate(seen):
+            pictures[i], _, owners = drawn(
                 self._client,
                 (size, size),
                 camera.view_matrix(),
@@ -95,8 +101,10 @@ class PictureStudio(Closeable):
                 distance=10,
                 shades=(look.ambient, look.diffuse, look.specular),
                 shadow=int(look.shadow),
-                flags=self._p.ER_NO_SEGMENTATION_MASK,
+                flags=self._p.ER_NO_SEGMENTATION_MASK if around is None else 0,
             )
+            if around is not None:
+                pictures[i] = around.finished(pictures[i], np.reshape(owners, (size, size)), i)
         if look.noise > 0:
             noise = chance.standard_normal(pictures.shape, dtype=np.float32) * np.float32(look.noise)
             pictures = np.clip(np.rint(pictures + noise), 0, 255).astype(np.uint8)
