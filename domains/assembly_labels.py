@@ -6,6 +6,7 @@ it is known which orders work. So a prior that learns them keeps to that heurist
 
 from __future__ import annotations
 
+import zlib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +15,10 @@ from numpy.typing import NDArray
 
 from domains.structures import structure_numbers
 from neurosym.errors import InputError
-from neurosym.language.labelled_problems import LabelledProblems
+from neurosym.experiments.engines import run_tasks
+from neurosym.geometry.assembly import Assembly
+from neurosym.language.labelled_problems import LabelledProblems, problem_again
+from neurosym.language.options import check_options
 from neurosym.language.problem import Problem
 from neurosym.planning.budget import Budget
 from neurosym.planning.order_scores import OrderScores
@@ -38,8 +42,10 @@ def labelled_problems(
     *,
     folder: str | Path | None = None,
     count: int | None = None,
+    only: str | None = None,
     without: str | None = None,
     seed: int = 0,
+    workers: int | None = None,
     progress: Progress = silent,
     **options: Any,
 ) -> LabelledProblems:
@@ -50,16 +56,18 @@ def labelled_problems(
         part: "train", "test" or "all" of the structures.
         folder: assemblies to take instead: its files and folders, each as `Assembly.load` reads it.
         count: how many structures of each kind; default all of the part.
-        without: a kind that is left out, to see what is learned from the others.
+        only, without: a kind that alone is taken, or that is left out, to see what is learned from the others.
         seed: of the sampled orders.
+        workers: processes; default one a core. The answer is the same for any number.
         progress: called with (done, total) problems.
 
     Raises:
-        InputError: an assembly that cannot be read, or none whose orders are found.
+        InputError: an option that problems do not take, an assembly that cannot be read, or none that comes apart.
     """
+    check_options(family.problem, options, family.name)
     if folder is None:
         left_out = set() if without is None else set(structure_numbers("all", without))
-        numbers = [n for n in structure_numbers(part) if n not in left_out]
+        numbers = [n for n in structure_numbers(part, only) if n not in left_out]
         kinds: dict[str, int] = {}
         given: list[Any] = []
         for number in numbers:
@@ -67,17 +75,21 @@ def labelled_problems(
             given += [number] if count is None or kinds[family.kind(number)] <= count else []
     else:
         given = _assemblies_in(Path(folder))
-    problems, tables = [], []
-    for k, one in enumerate(given):
-        problem = family.problem(one, **options)
-        table = order_shares(problem, np.random.default_rng([seed, k]))
-        if table is not None:
-            problems.append(problem)
-            tables.append(table)
-        progress(k + 1, len(given))
-    if not problems:
+
+    def labelled(k: int) -> tuple[Assembly, str, dict[str, Any], NDArray[np.float64] | None]:
+        problem = family.problem(given[k], **options)
+        rng = np.random.default_rng([seed, zlib.crc32(problem.name.encode())])
+        return problem.world, problem.name, dict(problem.details), order_shares(problem, rng)
+
+    known = {}
+    for k, answer in run_tasks(labelled, range(len(given)), workers=workers):
+        known[k] = answer
+        progress(len(known), len(given))
+    apart = [known[k] for k in range(len(given)) if known[k][3] is not None]
+    if not apart:
         raise InputError(f"Expected assemblies that come apart, to learn from; none of {len(given)} did.")
-    return LabelledProblems(tuple(problems), tuple(tables))
+    problems = tuple(problem_again(family, world, name, details) for world, name, details, _ in apart)
+    return LabelledProblems(problems, tuple(table for *_, table in apart if table is not None))
 
 
 def order_shares(problem: Problem, rng: np.random.Generator) -> NDArray[np.float64] | None:

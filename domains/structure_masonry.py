@@ -17,9 +17,10 @@ from neurosym.geometry.shapes import Part
 
 
 def stack(rng: np.random.Generator) -> list[Part]:
-    """Dry stone: blocks of two heights and many lengths, each laid where it and all before it stand."""
+    """Dry stone: blocks of two heights, many lengths and weights, each laid where it and all before it stand."""
     count, ground = int(rng.integers(4, 21)), rng.uniform(2.5, 6.0)
     laid: list[Bounds] = []
+    parts: list[Part] = []
     for _ in range(10 * count):
         if len(laid) == count:
             break
@@ -28,14 +29,11 @@ def stack(rng: np.random.Generator) -> list[Part]:
         under = [b for b in laid if b[0][0] < x + length - 0.1 and b[0][1] > x + 0.1]
         z = max((b[2][1] for b in under), default=0.0)
         bounds = ((x, x + length), (0.0, 1.0), (z, z + height))
-        if z < 6 and _stand([*laid, bounds]):
+        stone = part(f"stone {len(laid)}", bounds, density=float(rng.choice([1.0, 4.0])))
+        if z < 6 and _stands([*parts, stone]):
             laid.append(bounds)
-    return [part(f"stone {i}", bounds) for i, bounds in enumerate(laid)]
-
-
-def _stand(laid: list[Bounds]) -> bool:
-    geometry = AssemblyGeometry(Assembly(tuple(part(str(i), bounds) for i, bounds in enumerate(laid))))
-    return geometry.stability.standing((1 << len(laid)) - 1).stands
+            parts.append(stone)
+    return parts
 
 
 def corbel(rng: np.random.Generator) -> list[Part]:
@@ -76,6 +74,28 @@ def _balanced(
         for k, (low, high) in enumerate(pairwise(cuts.tolist())):
             parts.append(part(f"{what} {name}.{k}", ((middle - size / 2, middle + size / 2), y, (low, high))))
     return parts
+
+
+def scale(rng: np.random.Generator) -> list[Part]:
+    """Beams on narrow piers, with blocks of many weights laid on them one by one, wherever all keeps in balance."""
+    parts: list[Part] = []
+    for row in range(int(rng.integers(1, 3))):
+        y, half, reach = (2.0 * row, 2.0 * row + 1), rng.uniform(0.3, 0.7), rng.uniform(1.5, 3.0)
+        tops = dict.fromkeys(np.linspace(-reach, reach - 0.5, 6).tolist(), 1.4)
+        parts.append(part(f"pier {row}", ((-half, half), y, (0, 1))))
+        parts.append(part(f"beam {row}", ((-reach, reach), y, (1, 1.4))))
+        for k in range(int(rng.integers(3, 30))):
+            x, height = float(rng.choice(list(tops))), float(rng.choice([0.3, 0.6, 1.0]))
+            bounds = ((x, x + 0.5), y, (tops[x], tops[x] + height))
+            block = part(f"block {row}.{k}", bounds, density=float(rng.choice([1.0, 3.0])))
+            if _stands([*parts, block]):
+                parts.append(block)
+                tops[x] += height
+    return parts
+
+
+def _stands(parts: list[Part]) -> bool:
+    return AssemblyGeometry(Assembly(tuple(parts))).stability.standing((1 << len(parts)) - 1).stands
 
 
 def arch(rng: np.random.Generator) -> list[Part]:
@@ -126,11 +146,11 @@ def lean(rng: np.random.Generator) -> list[Part]:
 
 
 def bridge(rng: np.random.Generator) -> list[Part]:
-    """Piers with an arm each way, anchored by weights at the shores; spans with loads lie between the tips."""
+    """Piers with an arm each way, anchored by weights at the shores; spans with heavy loads lie between the tips."""
     parts: list[Part] = []
     arm, top = rng.uniform(1.5, 2.5), int(rng.integers(1, 3))
     middles = np.arange(int(rng.integers(2, 5))) * (2 * arm + rng.uniform(1.2, 2.0))
-    deck, half = top + 0.5, rng.uniform(0.3, 0.5)
+    deck, half, density = top + 0.5, rng.uniform(0.25, 0.4), rng.uniform(2.0, 5.0)
     for i, x in enumerate(middles):
         parts += [part(f"pier {i}.{k}", ((x - half, x + half), (0, 1), (k, k + 1))) for k in range(top)]
         parts.append(part(f"arm {i}", ((x - arm, x + arm), (0, 1), (top, deck))))
@@ -140,9 +160,9 @@ def bridge(rng: np.random.Generator) -> list[Part]:
         parts.append(part(f"span {i}", ((low, high), (0, 1), (deck, deck + 0.3))))
         z, count = deck + 0.3, int(rng.integers(0, 3))
         for k in range(count):
-            parts.append(part(f"load {i}.{k}", ((low + 0.1, high - 0.1), (0, 1), (z, z + 0.3))))
-            z += 0.3
-        weights.append((high - low) * 0.3 * (1 + count))
+            parts.append(part(f"load {i}.{k}", ((low + 0.1, high - 0.1), (0, 1), (z, z + 0.2)), density=density))
+            z += 0.2
+        weights.append((high - low) * (0.3 + 0.2 * density * count))
     ends = (("left", middles[0] - arm, 1, weights[0]), ("right", middles[-1] + arm, -1, weights[-1]))
     for end, x, inward, hung in ends:
         need = max(0.2, (hung / 2 * (arm - half) - arm * half) / (arm - 0.2 + half) / 0.4)
@@ -154,7 +174,7 @@ def bridge(rng: np.random.Generator) -> list[Part]:
 
 
 def wall(rng: np.random.Generator) -> list[Part]:
-    """Courses of bricks of many lengths with an opening, closed by a lintel or by bricks that overhang."""
+    """Courses of bricks of many lengths and weights with an opening, closed by a lintel or by bricks that overhang."""
     length, courses = rng.uniform(4.0, 8.0), int(rng.integers(2, 6))
     left = rng.uniform(1.0, length / 2 - 0.5)
     right, sill, head = left + rng.uniform(0.8, 1.6), int(rng.integers(0, 2)), int(rng.integers(1, courses + 1))
@@ -171,5 +191,6 @@ def wall(rng: np.random.Generator) -> list[Part]:
             cuts = np.linspace(low, high, pieces + 1)
             cuts[1:-1] += rng.uniform(-0.25, 0.25, pieces - 1) * (high - low) / pieces
             for k, (a, b) in enumerate(pairwise(cuts.tolist())):
-                parts.append(part(f"brick {course}.{s}.{k}", ((a, b), (0, 1), (course, course + 1))))
+                density = float(rng.choice([1.0, 3.0]))
+                parts.append(part(f"brick {course}.{s}.{k}", ((a, b), (0, 1), (course, course + 1)), density=density))
     return parts

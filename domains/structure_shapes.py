@@ -15,7 +15,7 @@ FIXED = "post"
 Bounds = tuple[tuple[float, float], tuple[float, float], tuple[float, float]]
 
 
-def part(name: str, *boxes: Bounds) -> Part:
+def part(name: str, *boxes: Bounds, density: float = 1.0) -> Part:
     """A part of boxes."""
     bodies = []
     for bounds in boxes:
@@ -23,7 +23,7 @@ def part(name: str, *boxes: Bounds) -> Part:
         X = np.eye(4)
         X[:3, 3] = (low + high) / 2
         bodies.append(Body(Box(high - low), X))
-    return Part(name, tuple(bodies), np.eye(4))
+    return Part(name, tuple(bodies), np.eye(4), density)
 
 
 def prism(name: str, outline: Array, depth: float) -> Part:

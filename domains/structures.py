@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 KINDS: dict[str, Callable[[np.random.Generator], list[Part]]] = {
     "stack": structure_masonry.stack,
     "corbel": structure_masonry.corbel,
+    "scale": structure_masonry.scale,
     "arch": structure_masonry.arch,
     "flat arch": structure_masonry.flat_arch,
     "lean": structure_masonry.lean,

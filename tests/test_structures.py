@@ -79,7 +79,7 @@ def test_sampled_shares_are_of_orders_that_work():
 
 
 def test_labelled_problems_are_written_and_read_again(tmp_path):
-    made = family.labelled_problems("test", count=1, without="wall")
+    made = family.labelled_problems("test", count=1, without="wall", workers=1)
     assert len(made) == len(KINDS) - 1
     again = LabelledProblems.load(made.save(tmp_path / "made.npz"), family)
     for (one, shares), (other, read) in zip(made, again):
@@ -97,8 +97,10 @@ def test_labelled_problems_are_written_and_read_again(tmp_path):
 def test_a_users_own_folder_is_read(tmp_path):
     for number in (0, 3):
         family.problem(number).world.save(tmp_path / f"{number}.json")
-    made = family.labelled_problems(folder=tmp_path, gravity=False)
+    made = family.labelled_problems(folder=tmp_path, gravity=False, workers=2)
     assert [p.name for p in made.problems] == ["0.json", "3.json"]
     assert not any(p.details["gravity"] for p in made.problems)
+    with pytest.raises(InputError, match="hold"):
+        family.labelled_problems(folder=tmp_path, hold=1)
     with pytest.raises(InputError, match="there is none"):
         family.labelled_problems(folder=tmp_path / "none")

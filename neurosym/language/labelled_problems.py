@@ -8,10 +8,10 @@ from __future__ import annotations
 import json
 import tempfile
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -108,9 +108,13 @@ def _written(assembly: Assembly, at: Path) -> str:
 
 def _read(family: ProblemFamily, document: str, assembly: str) -> Problem:
     given = json.loads(document)
-    options = given["options"]
-    options["ground"] = False if options.get("ground") is None else options["ground"]
     with tempfile.TemporaryDirectory() as folder:
         at = Path(folder) / "assembly.json"
         at.write_text(assembly, encoding="utf-8")
-        return family.problem(Assembly.load(at), name=given["name"], **options)
+        return problem_again(family, Assembly.load(at), given["name"], given["options"])
+
+
+def problem_again(family: ProblemFamily, assembly: Assembly, name: str, details: Mapping[str, Any]) -> Problem:
+    """The problem about an assembly that a family once made with these details."""
+    ground = False if details.get("ground") is None else details["ground"]
+    return family.problem(assembly, name=name, **{**details, "ground": ground})
