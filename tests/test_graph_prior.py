@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
@@ -16,6 +14,7 @@ from domains.structures import KINDS
 from learned_priors.assembly_graph import CONTACT, DIRECTION, PART, read_graph
 from learned_priors.graph_network import GraphConfig
 from learned_priors.graph_prior import BUNDLED, GraphSinkhorn, load_graph_network
+from neurosym.cli import main
 from neurosym.errors import CheckpointError, InputError
 from neurosym.testing import check_prior
 from neurosym.testing.burrs import RINGS
@@ -139,18 +138,17 @@ def test_a_complete_planner_stays_complete_under_it(planner):
     assert ns.solve(family.problem(rings), planner=planner, prior="graph-sinkhorn").status is ns.Status.UNSOLVABLE
 
 
-def test_it_is_trained_from_the_command_line_on_a_folder_of_ones_own(tmp_path):
+def test_it_is_trained_from_the_command_line_on_a_folder_of_ones_own(tmp_path, capsys):
     for number in (0, 1, 3):
         family.problem(number).world.save(tmp_path / "own" / f"{number}.json")
     demos, weights = tmp_path / "own.npz", tmp_path / "own.safetensors"
-    run = [sys.executable, "-m", "neurosym.cli"]
-    told = subprocess.run(
-        [*run, "demos", "assembly", "--out", demos, "--option", f"folder={tmp_path / 'own'}"],
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert "3 assemblies of 3 to 5 actions" in told.stdout
-    train = [*run, "train", "assembly", "--prior", "graph-sinkhorn", "--epochs", "1", "--demos", demos]
-    subprocess.run([*train, "--out", weights], capture_output=True, check=True)
+    run("demos", "assembly", "--out", demos, "--option", f"folder={tmp_path / 'own'}", "--option", "workers=1")
+    assert "3 assemblies of 3 to 5 actions" in capsys.readouterr().out
+    run("train", "assembly", "--prior", "graph-sinkhorn", "--epochs", "1", "--demos", demos, "--out", weights)
     assert ns.load_prior(weights).header["demonstrations"] == {"file": "own.npz"}
+
+
+def run(*arguments):
+    with pytest.raises(SystemExit) as end:
+        main([str(argument) for argument in arguments])
+    assert not end.value.code
