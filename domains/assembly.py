@@ -14,14 +14,17 @@ from typing import Any
 import numpy as np
 
 from domains.assembly_groups import apart_in_groups
+from domains.assembly_labels import labelled_problems
 from domains.assembly_removal import apart_one_by_one, removal_domain
 from domains.assembly_samples import SAMPLES, TRAINING, sample
+from domains.structures import SPAN, kind_of, structure, structure_numbers
 from neurosym.errors import AssemblyError, InputError, UnknownNameError
 from neurosym.geometry.assembly import NO_TABLE, Assembly
 from neurosym.geometry.blocking.directions import Directions
 from neurosym.geometry.keeping import keep_together
 from neurosym.geometry.queries import AssemblyGeometry
 from neurosym.language import Problem
+from neurosym.language.labelled_problems import LabelledProblems
 from neurosym.language.problem import as_names, checked_pairs
 from neurosym.language.problem_family import ProblemFamily
 
@@ -53,7 +56,7 @@ class Setting:
 
 
 class AssemblyFamily(ProblemFamily):
-    """Assemblies of a user's own: files, cells or meshes; and a few small samples, by number."""
+    """Assemblies of a user's own: files, cells or meshes; by number also samples, and structures made at random."""
 
     name = "assembly"
     reference = (
@@ -62,6 +65,7 @@ class AssemblyFamily(ProblemFamily):
     )
     #: The symbols where no option says otherwise; those of groups are in `domains.assembly_groups`.
     domain = removal_domain(Setting())
+    priors = ("graph-sinkhorn",)
 
     def problem(
         self,
@@ -71,7 +75,7 @@ class AssemblyFamily(ProblemFamily):
         paths: str = "straight",
         groups: bool = False,
         gravity: bool = True,
-        held: int = 0,
+        held: int | None = None,
         stability: str = "springs",
         pull: bool = False,
         tilt: float = 0.0,
@@ -86,7 +90,8 @@ class AssemblyFamily(ProblemFamily):
         """Take an assembly apart: all parts that are not fixed are to be out.
 
         Args:
-            given: an assembly, the path of one (`Assembly.load`), or the number of a sample.
+            given: an assembly, the path of one (`Assembly.load`), or the number of a sample or of a structure made at
+                random (`domains.structures`).
             directions: of straight removal: "axes", "contacts", a number of sampled ones, text such as "+z,-x", or
                 vectors (k, 3). They are tried in order.
             paths: "straight" lines to infinity only, or "any": where none is free, a path is searched for. On
@@ -95,7 +100,7 @@ class AssemblyFamily(ProblemFamily):
             groups: whether parts may leave together, to be taken apart afterwards, in the hand and without gravity.
             gravity: whether what stays must stand by itself, friction included.
             held: how many of the parts that stay may be held meanwhile; any, and others at each step. Without gravity
-                it does not matter.
+                it does not matter. Default none; of structures made at random one, where they have fixed parts.
             stability: what standing means: "springs", as a simulation shows it; or "limit", that some forces balance
                 the parts, whether or not they would arise. A fall that only springs see promises planners nothing.
             pull: whether what stays must also stand while a part is drawn out along its way, which drags what it
@@ -118,7 +123,8 @@ class AssemblyFamily(ProblemFamily):
             InputError: an option that is not one of those above, or an assembly of fixed parts only.
             AssemblyError: parts that cannot be used, or that reach below the ground.
         """
-        assembly, called = _assembly(given, units)
+        assembly, called, hand = self._assembly(given, units)
+        held = hand if held is None else held
         _check_options(paths, groups, gravity, held, ground, pull)
         if pull and not (gravity and stability == "springs"):
             raise InputError('Expected pull=True under gravity with stability="springs", which alone knows what drags.')
@@ -148,30 +154,43 @@ class AssemblyFamily(ProblemFamily):
         make = apart_in_groups if groups else apart_one_by_one
         return make(geometry, setting, before=before, name=name or called, family=self.name, details=details)
 
-    def numbers(self, part: str = "test", *, split: int = 0) -> tuple[int, ...]:
-        """Numbers of the samples: see `domains.assembly_samples`."""
+    def numbers(self, part: str = "test", *, split: int = 0, kind: str | None = None) -> tuple[int, ...]:
+        """Numbers of the samples (`domains.assembly_samples`), then of structures made at random; or of one kind."""
         numbers = {"all": range(len(SAMPLES)), "train": range(TRAINING), "test": range(TRAINING, len(SAMPLES))}
         if part not in numbers:
             raise UnknownNameError("part", part, numbers)
-        return tuple(numbers[part])
+        samples = tuple(numbers[part]) if kind in (None, "sample") else ()
+        return samples if kind == "sample" else samples + structure_numbers(part, kind)
+
+    def kind(self, number: int) -> str:
+        return "sample" if number < SPAN else kind_of(number)
 
     def problems(self, part: str = "test", *, split: int = 0, **options: Any) -> list[Problem]:
-        """The samples of a part, with the options of `problem`."""
-        return [self.problem(n, **options) for n in self.numbers(part, split=split)]
+        """The samples of a part, with the options of `problem`; structures are made one by one, by their numbers."""
+        return [self.problem(n, **options) for n in self.numbers(part, split=split, kind="sample")]
 
+    def labelled_problems(self, part: str = "train", **options: Any) -> LabelledProblems:
+        """Structures made at random, or a folder of assemblies, with shares of their orders.
 
-def _assembly(given: Assembly | str | Path | int, units: str | None) -> tuple[Assembly, str]:
-    """The assembly, and what to call it."""
-    if units is not None and not isinstance(given, str | Path):
-        raise InputError("Expected units with the path of files to read; an Assembly has its own. Leave them out.")
-    if isinstance(given, Assembly):
-        return given, "assembly"
-    if isinstance(given, str | Path):
-        path = Path(given)
-        return Assembly.load(path, units=units), path.resolve().name
-    if isinstance(given, int | np.integer) and not isinstance(given, bool):
-        return sample(int(given))
-    raise InputError(f"Expected an Assembly, the path of one, or the number of a sample; got {given!r}.")
+        See `domains.assembly_labels.labelled_problems` for the options.
+        """
+        return labelled_problems(self, part, **options)
+
+    def _assembly(self, given: Assembly | str | Path | int, units: str | None) -> tuple[Assembly, str, int]:
+        """The assembly, what to call it, and how many parts may be held unless somebody says so."""
+        if units is not None and not isinstance(given, str | Path):
+            raise InputError("Expected units with the path of files to read; an Assembly has its own. Leave them out.")
+        if isinstance(given, Assembly):
+            return given, "assembly", 0
+        if isinstance(given, str | Path):
+            path = Path(given)
+            return Assembly.load(path, units=units), path.resolve().name, 0
+        if isinstance(given, int | np.integer) and not isinstance(given, bool):
+            if given >= SPAN:
+                made = structure(self, int(given))
+                return made.assembly, f"{kind_of(int(given))} {given}", made.held
+            return *sample(int(given)), 0
+        raise InputError(f"Expected an Assembly, the path of one, or the number of a sample; got {given!r}.")
 
 
 def _check_options(

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 
 from learned_priors.checkpoints import read_tensors, write_tensors
 from learned_priors.networks import NetworkConfig, OrderNetwork
@@ -57,7 +57,7 @@ def fingerprint(
     return digest.hexdigest()
 
 
-def save_state(path: Path, mark: str, state: RunState, network: OrderNetwork, optimizer: torch.optim.Optimizer) -> None:
+def save_state(path: Path, mark: str, state: RunState, network: nn.Module, optimizer: torch.optim.Optimizer) -> None:
     """Write the run's state, whole or not at all."""
     tensors = {f"model.{name}": tensor for name, tensor in network.state_dict().items()}
     tensors |= {f"best.{name}": tensor for name, tensor in state.best.items()}
@@ -68,7 +68,7 @@ def save_state(path: Path, mark: str, state: RunState, network: OrderNetwork, op
     write_tensors(path, tensors, {"kind": _KIND, "fingerprint": mark, "state": plain})
 
 
-def load_state(path: Path, mark: str, network: OrderNetwork, optimizer: torch.optim.Optimizer) -> RunState:
+def load_state(path: Path, mark: str, network: nn.Module, optimizer: torch.optim.Optimizer) -> RunState:
     """Load network and optimiser from `path`, and give the rest; `CheckpointError` if damaged or of another run."""
     tensors, header = read_tensors(path)
     if header.get("kind") != _KIND or header.get("fingerprint") != mark:

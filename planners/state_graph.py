@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from neurosym.geometry.step_motion import StepMotion
 from neurosym.language.search_problem import SearchProblem, Step
 from neurosym.planning.budget import Budget
+from neurosym.planning.order_scores import OrderScores
 from neurosym.planning.result import OrderCount
 from planners.node import Node
 from planners.search_context import BudgetSpent, SearchContext
@@ -158,14 +159,17 @@ def _next_layer(context: SearchContext, layer: dict[tuple[Any, int], int]) -> di
     return below
 
 
-def order_marginals(problem: SearchProblem[Any]) -> NDArray[np.float64]:
+def order_marginals(problem: SearchProblem[Any], scores: OrderScores | None = None) -> NDArray[np.float64]:
     """The share of all orders that have action a at step i: float64, shape (longest order, N).
 
+    With scores, orders count by their probability under these: what is believed once it is known which orders work.
     Interchangeable actions share equally. Row i sums to the share of orders with more than i steps, which is 1
     where all orders are equally long. With no order at all: shape (0, N).
     """
     graph = StateGraph(_context(problem))
     classes = np.asarray(graph.context.classes, dtype=np.int64)
+    if scores is not None:
+        return _weighted_marginals(graph, scores, classes)
     shares = np.zeros((len(graph.layers), len(classes)))
     leading = {graph.root: 1}
     for step, layer in enumerate(graph.layers):
@@ -174,6 +178,29 @@ def order_marginals(problem: SearchProblem[Any]) -> NDArray[np.float64]:
                 leading[child] = leading.get(child, 0) + leading[node]
                 # Python's integers first: counts of orders outgrow a float's 53 bits, shares do not.
                 shares[step, action] += leading[node] * child.orders / graph.root.orders if child.orders else 0.0
+    return _shared(shares, classes)
+
+
+def _weighted_marginals(graph: StateGraph, scores: OrderScores, classes: NDArray[np.int64]) -> NDArray[np.float64]:
+    """By sums of logarithms from the end and from the beginning, as in a hidden Markov model."""
+    ahead: dict[StateNode, float] = {}
+    for step, layer in reversed(list(enumerate(graph.layers))):
+        for node in layer:
+            onward = [ahead[e.node] - scores.cost(step, e.action) for e in node.edges if e.node.orders]
+            ahead[node] = 0.0 if node.is_goal else float(np.logaddexp.reduce(onward)) if onward else -np.inf
+    shares = np.zeros((len(graph.layers), len(classes)))
+    behind = {graph.root: 0.0}
+    for step, layer in enumerate(graph.layers):
+        for node in layer:
+            for action, _, child in node.edges:
+                if child.orders:
+                    to_child = behind[node] - scores.cost(step, action)
+                    behind[child] = float(np.logaddexp(behind.get(child, -np.inf), to_child))
+                    shares[step, action] += np.exp(to_child + ahead[child] - ahead[graph.root])
+    return _shared(shares, classes)
+
+
+def _shared(shares: NDArray[np.float64], classes: NDArray[np.int64]) -> NDArray[np.float64]:
     for label in np.unique(classes):
         members = classes == label
         shares[:, members] = shares[:, members].mean(axis=1, keepdims=True)

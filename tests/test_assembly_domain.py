@@ -125,7 +125,7 @@ def outer(assembly, part):
 # -- samples, planners, priors ----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("number", family.numbers("all"))
+@pytest.mark.parametrize("number", family.numbers("all", kind="sample"))
 @pytest.mark.parametrize("options", [{}, {"groups": True}, {"gravity": False}, {"held": 1}], ids=str)
 def test_samples_come_apart_and_keep_their_promises(number, options):
     problem = family.problem(number, **options)

@@ -209,7 +209,8 @@ def test_bad_input_is_refused_in_a_sentence(capsys, gate, tmp_path, monkeypatch,
 def test_a_prior_that_reads_pictures_is_left_out_of_a_comparison(capsys):
     code, out, err = call(capsys, "compare", "assembly", "--problems", "2", "--workers", "1", "--json")
     assert code == 0
-    assert {row["prior"] for row in json.loads(out)["rows"]} == {"none", "outermost-first"}
+    assert {row["prior"] for row in json.loads(out)["rows"]} == {"none", "outermost-first", "graph-sinkhorn"}
+    assert {row["kind"] for row in json.loads(out)["rows"]} == {"sample"}
     assert "Left out: the prior sinkhorn" in err
     code, out, _ = call(
         capsys, *["compare", "assembly", "--problems", "2", "--workers", "1", "--json", "--prior", "outermost-first"]

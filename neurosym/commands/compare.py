@@ -43,7 +43,7 @@ def compare(
     as_json: common.AsJson = False,
     workers: Annotated[int | None, typer.Option(min=1, metavar="N", help="Processes; default one a core.")] = None,
 ) -> None:
-    """Compare planners and priors on a domain's problems: one row a planner and prior.
+    """Compare planners and priors on a domain's problems: one row a planner and prior, of each kind of problem.
 
     Writes results.csv, results.md and iterations.png. Finished runs are kept in DIR/runs.jsonl: interrupted, or asked
     again with one more prior, it does only the rest.
@@ -69,11 +69,13 @@ def compare(
         domain=domain,
         numbers=_numbers(family, problems, split, own),
         planners=tuple(dict.fromkeys(planner or PLANNERS)),
-        priors=tuple(dict.fromkeys(prior or PRIORS)),
+        priors=tuple(dict.fromkeys(prior or (*PRIORS[:2], *family.priors, *PRIORS[2:]))),
         options=common.problem_options(family, collapse=collapse, pictures=style) | of_problems,
         oracle=oracle,
         seeds=seeds,
     )
+    if oracle == "physics":
+        comparison = _simulated(comparison, family)
     comparison, scores = _scores(comparison, asked=bool(prior), workers=processes)
     with common.progress_bar("planning") as progress:
         journal = folder / "runs.jsonl" if folder else None
@@ -103,6 +105,15 @@ def _numbers(family: ProblemFamily, problems: str, split: int, options: Mapping[
     return tuple(family.numbers(problems, split=split, **own))
 
 
+def _simulated(comparison: Comparison, family: ProblemFamily) -> Comparison:
+    """Without the problems that a simulation does not judge, as long as it judges some."""
+    numbers = comparison.numbers
+    kept = tuple(n for n in numbers if family.problem(n, **comparison.options).simulation is not None)
+    if 0 < len(kept) < len(numbers):
+        common.say(f"Left out: {len(numbers) - len(kept)} problems that no simulation judges (fixed or held parts).")
+    return dataclasses.replace(comparison, numbers=kept or numbers)
+
+
 def _scores(comparison: Comparison, *, asked: bool, workers: int) -> tuple[Comparison, dict[str, Any]]:
     """The priors' scores; of the default priors, those that do not know this domain are left out."""
     from neurosym.experiments.benchmark import ask_priors
@@ -121,9 +132,9 @@ def _show(outcome: Outcome, given: list[Row], family: ProblemFamily, folder: Pat
     comparison = outcome.comparison
     rendered = table(given)
     out = common.console(rendered)
-    options = ", ".join(f"{key} {value}" for key, value in comparison.options.items())
+    options = "".join(f"{key} {value}, " for key, value in comparison.options.items())
     seeds = f", {comparison.seeds} seeds each" if comparison.seeds > 1 else ""
-    out.print(f"{comparison.domain}: {len(comparison.numbers)} problems{seeds}; {options}, oracle {comparison.oracle}")
+    out.print(f"{comparison.domain}: {len(comparison.numbers)} problems{seeds}; {options}oracle {comparison.oracle}")
     out.print(rendered)
     if outcome.image_blind is not None:
         out.print(

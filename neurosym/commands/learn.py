@@ -10,31 +10,56 @@ import typer
 
 from neurosym.commands import common
 from neurosym.errors import InputError, UnknownNameError
+from neurosym.language.problem_family import ProblemFamily
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from neurosym.language.demonstrations import Demonstrations
+    from neurosym.language.labelled_problems import LabelledProblems
     from neurosym.language.problem import Problem
     from neurosym.planning.prior import Prior
 
 #: Problems on which a trained prior is compared with none.
 WORTH = 20
 
+#: What priors that read geometry learn from, in place of "full" and "paper".
+PROBLEMS = "problems"
+
 
 def demos(
     domain: common.DomainName,
     out: Annotated[Path, typer.Option(metavar="FILE", help="Where to write them: a file in .npz.")],
-    recipe: Annotated[str, typer.Option(metavar="full|paper", help="Which labels.")] = "full",
+    recipe: Annotated[
+        str | None,
+        typer.Option(
+            metavar="full|paper|problems",
+            help="Which labels; `problems`: assemblies and shares of orders. Default the domain's.",
+        ),
+    ] = None,
     part: Annotated[str, typer.Option(metavar="train|test|all", help="Of which problems.")] = "train",
     split: common.Split = 0,
     pictures: common.PictureStyle = "clean",
     seed: Annotated[int, typer.Option(min=0, help="Of the pictures.")] = 0,
     option: common.FamilyOptions = None,
 ) -> None:
-    """Write demonstrations of a domain: pictures, orders and shares of valid orders."""
+    """Write demonstrations of a domain: pictures, orders and shares of valid orders; or assemblies with shares.
+
+    Of the domain assembly, --option folder=DIR takes assemblies of your own, a file or folder each in DIR.
+    """
+    from neurosym.registry import load_domain
+
     _check_suffix(out, ".npz")
-    made = _demonstrations(domain, part, split, recipe, pictures, seed, common.family_options(option))
+    own = common.family_options(option)
+    if recipe is None:
+        pictured = type(load_domain(domain)).demonstrations is not ProblemFamily.demonstrations
+        recipe = "full" if pictured else PROBLEMS
+    if recipe == PROBLEMS:
+        labelled = _labelled(domain, part, seed, own)
+        labelled.save(out)
+        print(f"{out}: {labelled.summary()}, with shares of valid orders")
+        return
+    made = _demonstrations(domain, part, split, recipe, pictures, seed, own)
     made.save(out)
     m, views, height, width, _ = made.pictures.shape
     shares = "with" if made.marginals is not None else "without"
@@ -44,7 +69,9 @@ def demos(
 
 def train(
     domain: common.DomainName,
-    prior: Annotated[str, typer.Option(metavar="Q", help="sinkhorn, tcn, sinkhorn-paper or tcn-paper.")],
+    prior: Annotated[
+        str, typer.Option(metavar="Q", help="sinkhorn, tcn, sinkhorn-paper, tcn-paper or graph-sinkhorn.")
+    ],
     out: Annotated[Path, typer.Option(metavar="FILE", help="The weights: a file in .safetensors.")],
     demos_file: Annotated[
         Path | None, typer.Option("--demos", metavar="FILE", help="Demonstrations of your own; default the domain's.")
@@ -94,12 +121,21 @@ def train(
     learner: Any = load_prior(prior, **({"encoder": encoder} if encoder else {}))
     if not (hasattr(learner, "fit") and hasattr(learner, "save")):
         raise InputError(f"Expected a prior that can be trained; {prior!r} cannot (it has no fit and save).")
-    if demos_file is not None:
+    recipe = getattr(learner, "labels", "full")
+    if recipe == PROBLEMS and (pictures or calibrate or part != "train"):
+        raise InputError(f"Expected --pictures, --part and --calibrate of a prior that reads pictures; got {prior!r}.")
+    given: Demonstrations | LabelledProblems
+    if demos_file is not None and recipe == PROBLEMS:
+        from neurosym.language.labelled_problems import LabelledProblems
+
+        given = LabelledProblems.load(demos_file, load_domain(domain))
+    elif demos_file is not None:
         from neurosym.language.demonstrations import Demonstrations
 
         given = Demonstrations.load(demos_file)
+    elif recipe == PROBLEMS:
+        given = _labelled(domain, "train", seed, common.family_options(option))
     else:
-        recipe = getattr(learner, "labels", "full")
         options = common.family_options(option)
 
         def shown(part: str, styles: list[Any]) -> Demonstrations:
@@ -153,7 +189,7 @@ def worth(prior: Prior, problems: Sequence[Problem]) -> str:
     return f"{saved}: {without - guided:.2f} saved."
 
 
-def _fit(learner: Any, given: Demonstrations, **options: Any) -> None:
+def _fit(learner: Any, given: Demonstrations | LabelledProblems, **options: Any) -> None:
     with common.progress_bars(transient=False) as bars:
         task = bars.add_task("the first epoch", total=None)
 
@@ -183,6 +219,13 @@ def _demonstrations(
         return family.demonstrations(
             part, split=split, recipe=recipe, style=pictures, seed=seed, progress=progress, **options
         )
+
+
+def _labelled(domain: str, part: str, seed: int, options: dict[str, Any]) -> LabelledProblems:
+    from neurosym.registry import load_domain
+
+    with common.progress_bar("assemblies and their orders") as progress:
+        return load_domain(domain).labelled_problems(part, seed=seed, progress=progress, **options)
 
 
 def _check_suffix(path: Path, suffix: str) -> None:

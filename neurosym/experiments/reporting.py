@@ -32,43 +32,50 @@ PUBLISHED = ("initial_failures", "iterations")
 
 
 def rows(outcome: Outcome) -> list[Row]:
-    """One row a planner and prior, over problems x seeds runs.
+    """One row a planner and prior, over problems x seeds runs; where the family has kinds of problems, of each kind.
 
-    Keys: domain, planner, prior, collapse, oracle; problems, seeds, runs; solved (problems solved under every seed),
-    runs_solved; initial_failure_rate (0 to 1: the prior's own first order is refused somewhere); iterations_mean and
-    iterations_std (population), expansions_mean, attempts_mean, over all runs, those that gave up too; seconds (in
-    the planner, all runs together), seconds_mean; image_blind_failure_rate; published (the paper's figures, or None).
+    Keys: kind, where there are any; domain, planner, prior, collapse, oracle; problems, seeds, runs; solved (problems
+    solved under every seed), runs_solved; initial_failure_rate (0 to 1: the prior's own first order is refused
+    somewhere); iterations_mean and iterations_std (population), expansions_mean, attempts_mean, over all runs, those
+    that gave up too; seconds (in the planner, all runs together), seconds_mean; image_blind_failure_rate; published
+    (the paper's figures, or None).
     """
-    comparison = outcome.comparison
-    groups = pd.DataFrame(list(outcome.runs)).groupby(["planner", "prior"])
-    table = []
-    for prior in comparison.priors:
-        for planner in comparison.planners:
-            runs = groups.get_group((planner, prior))
-            solved = runs["status"] == "SOLVED"
-            row = {
-                "domain": comparison.domain,
-                "planner": planner,
-                "prior": prior,
-                "collapse": comparison.options.get("collapse"),
-                "oracle": comparison.oracle,
-                "problems": len(comparison.numbers),
-                "solved": len(comparison.numbers) - runs.loc[~solved, "number"].nunique(),
-                "seeds": comparison.seeds,
-                "runs": len(runs),
-                "runs_solved": int(solved.sum()),
-                "initial_failure_rate": float(runs["first_order_failed"].mean()),
-                "iterations_mean": float(runs["iterations"].mean()),
-                "iterations_std": float(runs["iterations"].std(ddof=0)),
-                "expansions_mean": float(runs["expansions"].mean()),
-                "attempts_mean": float(runs["attempts"].mean()),
-                "seconds": float(runs["seconds"].sum()),
-                "seconds_mean": float(runs["seconds"].mean()),
-                "image_blind_failure_rate": outcome.image_blind,
-                "published": published(comparison.domain, planner, prior),
-            }
-            table.append(row)
-    return table
+    comparison, kind = outcome.comparison, load_domain(outcome.comparison.domain).kind
+    table = pd.DataFrame(list(outcome.runs))
+    groups = table.groupby([table["number"].map(kind), "planner", "prior"])
+    kinds = dict.fromkeys(map(kind, comparison.numbers))
+    return [
+        ({"kind": own} if own else {}) | _row(outcome, planner, prior, groups.get_group((own, planner, prior)))
+        for own in kinds
+        for prior in comparison.priors
+        for planner in comparison.planners
+    ]
+
+
+def _row(outcome: Outcome, planner: str, prior: str, runs: pd.DataFrame) -> Row:
+    comparison, solved = outcome.comparison, runs["status"] == "SOLVED"
+    problems = runs["number"].nunique()
+    return {
+        "domain": comparison.domain,
+        "planner": planner,
+        "prior": prior,
+        "collapse": comparison.options.get("collapse"),
+        "oracle": comparison.oracle,
+        "problems": problems,
+        "solved": problems - runs.loc[~solved, "number"].nunique(),
+        "seeds": comparison.seeds,
+        "runs": len(runs),
+        "runs_solved": int(solved.sum()),
+        "initial_failure_rate": float(runs["first_order_failed"].mean()),
+        "iterations_mean": float(runs["iterations"].mean()),
+        "iterations_std": float(runs["iterations"].std(ddof=0)),
+        "expansions_mean": float(runs["expansions"].mean()),
+        "attempts_mean": float(runs["attempts"].mean()),
+        "seconds": float(runs["seconds"].sum()),
+        "seconds_mean": float(runs["seconds"].mean()),
+        "image_blind_failure_rate": outcome.image_blind,
+        "published": published(comparison.domain, planner, prior),
+    }
 
 
 def published(domain: str, planner: str, prior: str) -> dict[str, Any] | None:
@@ -101,8 +108,9 @@ def table(given: Sequence[Row]) -> Table:
 
     made = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1))
     counts = ("solved", "initial\nfailures %", "iterations\nmean ± sd", "expan-\nsions", "at-\ntempts", "ms a\nproblem")
-    for column in ("planner", "prior", *counts, "paper:\nfailures %", "paper:\niterations"):
-        made.add_column(column, justify="left" if column in ("planner", "prior") else "right", no_wrap=True)
+    named = (*_kind_of_row(given, "kind"), "planner", "prior")
+    for column in (*named, *counts, "paper:\nfailures %", "paper:\niterations"):
+        made.add_column(column, justify="left" if column in named else "right", no_wrap=True)
     for i, row in enumerate(given):
         made.add_row(*cells(row), end_section=i + 1 < len(given) and given[i + 1]["prior"] != row["prior"])
     return made
@@ -112,6 +120,7 @@ def cells(row: Mapping[str, Any]) -> tuple[str, ...]:
     """A row as text, in the order of the table."""
     prior, paper = row["prior"], row["published"] or {}
     return (
+        *_kind_of_row([row], row.get("kind")),
         str(row["planner"]),
         Path(prior).name if prior.endswith(".safetensors") else prior,
         f"{row['runs_solved']}/{row['runs']}",
@@ -124,9 +133,24 @@ def cells(row: Mapping[str, Any]) -> tuple[str, ...]:
     )
 
 
+def _kind_of_row(given: Sequence[Mapping[str, Any]], text: Any) -> tuple[str, ...]:
+    """A first cell, where rows are of kinds of problems."""
+    return (str(text),) if any("kind" in row for row in given) else ()
+
+
 def markdown(given: Sequence[Row]) -> str:
     """The rows as a Markdown table, for the README."""
-    head = ("planner", "prior", "solved", "initial failures %", "iterations", "expansions", "attempts", "ms a problem")
+    head = (
+        *_kind_of_row(given, "kind"),
+        "planner",
+        "prior",
+        "solved",
+        "initial failures %",
+        "iterations",
+        "expansions",
+        "attempts",
+        "ms a problem",
+    )
     papers = ("paper: failures %", "paper: iterations")
     return "\n".join(markdown_table([(*head, *papers), *map(cells, given)], rule=" --- ")) + "\n"
 

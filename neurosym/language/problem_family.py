@@ -15,6 +15,7 @@ from neurosym.support.progress import Progress as Progress
 if TYPE_CHECKING:
     from neurosym.language.demonstrations import Demonstrations
     from neurosym.language.domain import Domain
+    from neurosym.language.labelled_problems import LabelledProblems
     from neurosym.language.problem import Problem
 
 
@@ -35,12 +36,14 @@ class ProblemFamily(Semantics, ABC):
     Attributes:
         reference: where the task and its numbers come from.
         published: rows of published figures, shown beside ours by `compare`.
+        priors: names of priors made for this family, which `compare` shows besides the usual ones.
     """
 
     name: ClassVar[str]
     domain: Domain
     reference: ClassVar[str]
     published: ClassVar[Sequence[Mapping[str, Any]]] = ()
+    priors: ClassVar[Sequence[str]] = ()
 
     @abstractmethod
     def problem(self, *args: Any, **options: Any) -> Problem:
@@ -57,6 +60,14 @@ class ProblemFamily(Semantics, ABC):
     def numbers(self, part: str = "test", *, split: int = 0) -> Sequence[int]:
         """Numbers of the problems of a part, as `problem` takes them; benchmarks rebuild problems from these."""
         raise NotImplementedError(f"the domain {self.name!r} does not number its problems")
+
+    def kind(self, number: int) -> str:
+        """What kind of problem has a number: tables show each kind by itself. Default: all are of one, without name."""
+        return ""
+
+    def labelled_problems(self, part: str = "train", **options: Any) -> LabelledProblems:
+        """Problems with orders to learn from, for priors that read the problems themselves."""
+        raise NotImplementedError(f"the domain {self.name!r} has no problems with labels")
 
     def pictures(self, problem: Problem, *, style: str = "clean", rng: np.random.Generator | None = None) -> Pixels:
         """Pictures of the finished work, uint8 (V, H, W, 3)."""

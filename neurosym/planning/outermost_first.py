@@ -1,5 +1,6 @@
 """A prior that needs no training: what lies outermost leaves first."""
 
+import itertools
 from collections.abc import Sequence
 
 import numpy as np
@@ -63,6 +64,15 @@ def outermost_order(
 ) -> list[str]:
     """Names of all parts, the outermost first, fixed ones last."""
     geometry = AssemblyGeometry.of(given)
+    layers = outermost_layers(geometry, directions, gravity=gravity)
+    order = [i for layer in layers for tied in layer for i in tied]
+    return [geometry.names[i] for i in [*order, *bits(geometry.assembly.fixed_mask)]]
+
+
+def outermost_layers(
+    geometry: AssemblyGeometry, directions: Directions = None, *, gravity: bool = True
+) -> list[list[list[int]]]:
+    """Numbers of all parts that are not fixed, layer by layer, each in its order, those together that tie."""
     assembly, graph, up = geometry.assembly, geometry.blocking(directions), geometry.blocking("+z")
     fixed = assembly.fixed_mask
     left = (1 << len(assembly)) - 1 & ~fixed
@@ -71,12 +81,13 @@ def outermost_order(
     middle = assembly.bounds.mean(axis=0)
     own = (assembly.body_bounds[assembly.owners == i] for i in range(len(assembly)))
     distance = [float(np.linalg.norm(bounds.mean(axis=(0, 1)) - middle)) for bounds in own]
-    order: list[int] = []
+    layers: list[list[list[int]]] = []
     while left:
         free = [i for i in bits(left) if graph.free_directions(i, left | fixed)] or bits(left)
         topmost = [i for i in free if not up.blockers(i, 0, left | fixed)] if gravity else []
         layer = topmost or free
         layer.sort(key=lambda i: (-height[i], -distance[i], i))
-        order += layer
+        ties = itertools.groupby(layer, key=lambda i: (height[i], round(distance[i] / assembly.touch)))
+        layers.append([list(tied) for _, tied in ties])
         left &= ~sum(1 << i for i in layer)
-    return [assembly.names[i] for i in [*order, *bits(fixed)]]
+    return layers

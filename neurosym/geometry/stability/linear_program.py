@@ -26,6 +26,8 @@ def solve_program(whole: Equilibrium, parts: Numbers, corners: Numbers, names: S
             with at least one of them.
         names: of the parts that are there, for the message where the solver fails.
     """
+    if not len(parts):
+        return Balance(True, np.zeros((0, CONE_EDGES)), np.zeros((0, 6)))
     place = np.full(len(whole.weights) + 1, -1)
     place[parts] = np.arange(len(parts))
     rows, columns, values = [], [], []
