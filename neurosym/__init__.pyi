@@ -17,13 +17,18 @@ from .language import (
     Derived as Derived,
     Domain as Domain,
     Fluent as Fluent,
+    Function as Function,
     GroundProblem as GroundProblem,
     Problem as Problem,
     Semantics as Semantics,
     State as State,
     Type as Type,
     derived as derived,
+    exists as exists,
+    forall as forall,
+    implies as implies,
     predicates as predicates,
+    when as when,
 )
 from .language.demonstrations import Demonstrations as Demonstrations
 from .language.problem_family import ProblemFamily as ProblemFamily

@@ -135,7 +135,8 @@ def search_and_check(
                     with open_oracle(problem, oracle) as fresh:
                         confirm(planner, result.plan, replay(fresh, result.plan))
             except OutOfTime:
-                nothing: dict[str, Any] = {"plan": None, "motions": (), "cost": None, "fewest": None}
+                nothing: dict[str, Any] = {"plan": None, "motions": ()}
+                nothing |= dict.fromkeys(("cost", "fewest", "total_cost", "cheapest"))
                 return results[:i] or [replace(result, status=Status.OUT_OF_BUDGET, **nothing)]
     return results
 
