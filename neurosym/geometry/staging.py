@@ -28,7 +28,7 @@ class Staging:
         assembly: all parts that ever appear, where they rest when assembled.
         present: names of those that are there before the first step.
         plan: names of the actions.
-        motions: one a step, each with its tracks.
+        motions: one a step, each with its tracks; without parts it moves nothing.
         colours: part name -> RGB in 0..1, for parts with a colour of their own.
         tops: part name -> what lies on its top, uint8 (H, W, 3), for parts that bear a picture.
         guessed: numbers of the steps whose motion the plan does not say: a free straight line was looked for.
@@ -70,9 +70,9 @@ def staged(
     geometry, there, long = AssemblyGeometry.of(given), set(present), []
     for motion in motions:
         others = there - set(motion.parts)
-        long.append(motion if motion.tracks else _straight(geometry, motion, others))
+        long.append(motion if motion.tracks or not motion.parts else _straight(geometry, motion, others))
         there = others | set(motion.parts) if motion.arrives else others
-    guessed = frozenset(i for i, m in enumerate(motions) if not m.tracks and not m.direction)
+    guessed = frozenset(i for i, m in enumerate(motions) if m.parts and not m.tracks and not m.direction)
     return Staging(geometry.assembly, tuple(present), tuple(plan), tuple(long), guessed=guessed)
 
 

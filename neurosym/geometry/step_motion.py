@@ -156,6 +156,8 @@ class StepMotion:
 
     def out(self, share: float) -> dict[str, Array]:
         """Each part that moves -> its pose, float64 (4, 4), at a share of the way out, 0 to 1, at even pace."""
+        if not self.tracks:
+            return {}
         key = self.tracks[0].key(min(max(share, 0.0), 1.0))
         return {name: pose for track in self.tracks for pose in [track.at(key)] for name in track.parts}
 

@@ -44,7 +44,8 @@ def stage(problem: Problem, plan: Sequence[str], motions: Sequence[StepMotion | 
         parts, arrive = moved.get(name, ((), False))
         whole.append((motion or StepMotion()).of_parts(parts, arrive=arrive))
         absent |= set(whole[-1].parts) if whole[-1].arrives else set()
-    if geometry is None or not all(motion.parts for motion in whole):
+    # A tool that is picked up is no part: such a step shows, and moves nothing.
+    if geometry is None or (whole and not any(motion.parts for motion in whole)):
         raise InputError(
             f"Expected a problem that says what its actions do to parts in space; {problem.name!r} does not. Give "
             "Domain.problem a world that is an Assembly and simulation=Simulation('rigid', removes={action: part}), or "

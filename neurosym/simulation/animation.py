@@ -64,7 +64,7 @@ def frames(
         report(ends)
         for i, motion in enumerate(staging.motions):
             around, words, note = company(staging, i), describe(staging, i), f"{i + 1}/{count}"
-            colour = colours[first_part(staging, i)]
+            colour = colours.get(first_part(staging, i))
             for k in range(1, moving + 1):
                 shot = film.picture({*around, *motion.parts}, motion.at(_eased(k / moving)), marked=motion.held)
                 yield captioned(shot, words, note=note, colour=colour, progress=(i + k / moving) / count)

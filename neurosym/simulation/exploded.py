@@ -95,7 +95,7 @@ def exploded_view(
 def _directions(staging: Staging) -> dict[str, Array]:
     """Part -> unit vector of its way out, where that is straight, or at least ends somewhere else."""
     found: dict[str, Array] = {}
-    for motion in staging.motions:
+    for motion in (m for m in staging.motions if m.tracks):
         end, centre = motion.tracks[0].poses[-1], motion.tracks[0].centre
         way = end[:3, :3] @ centre + end[:3, 3] - centre
         length = float(np.linalg.norm(way))

@@ -150,6 +150,8 @@ class _Run:
         """Do one step, and let the rest settle."""
         world, action, motion = self.world, self._staging.plan[number], self._staging.motions[number]
         there = {part for part, _ in world.there}
+        if not motion.parts:
+            return in_hand(action, motion, "Nothing of the assembly moves.")
         if motion.arrives:
             later = self._staging.motions[number + 1 :]
             if any(other.arrives and set(motion.parts) & set(other.parts) for other in later):

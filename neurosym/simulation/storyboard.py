@@ -40,14 +40,16 @@ def company(staging: Staging, step: int) -> tuple[str, ...]:
 
 
 def first_part(staging: Staging, step: int) -> str:
-    """The part that a step is about: the one that its action is named after, or the first that moves."""
+    """The part that a step is about: the one that its action is named after, or the first that moves; "" for none."""
     action, parts = staging.plan[step], staging.motions[step].parts
-    return action if action in parts else parts[0]
+    return action if action in parts else next(iter(parts), "")
 
 
 def describe(staging: Staging, step: int) -> str:
     """'remove L, along +z'; 'remove a with b, along +x'; 'take a off b, along -z'."""
     action, motion = staging.plan[step], staging.motions[step]
+    if not motion.parts:
+        return action
     around, part = set(company(staging, step)), first_part(staging, step)
     verb = "place" if motion.arrives else "remove"
     others = [name for name in motion.parts if name != part]
@@ -80,7 +82,7 @@ def room_for(staging: Staging) -> Array:
     bounds = zip(staging.assembly.names, staging.assembly.part_bounds)
     corners = {name: np.array(np.meshgrid(*b.T)).reshape(3, -1).T for name, b in bounds}
     found = list(corners.values())
-    for motion in staging.motions:
+    for motion in (m for m in staging.motions if m.tracks):
         for share in np.linspace(0, 1, 2 * len(motion.tracks[0].poses) + 1):
             found += [corners[name] @ X[:3, :3].T + X[:3, 3] for name, X in motion.at(float(share)).items()]
     return np.concatenate(found)
