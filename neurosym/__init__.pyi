@@ -38,6 +38,13 @@ from .language.search_problem import (
     Step as Step,
     Verdict as Verdict,
 )
+from .interop import register_engine as register_engine
+from .pddl.lifted import to_pddl as to_pddl
+from .pddl.reading import (
+    from_pddl as from_pddl,
+    from_unified_planning as from_unified_planning,
+    to_unified_planning as to_unified_planning,
+)
 from .pipeline import count_plans as count_plans, plans as plans, solve as solve
 from .planning.budget import Budget as Budget
 from .planning.order_scores import OrderScores as OrderScores

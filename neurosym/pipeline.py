@@ -61,9 +61,16 @@ def solve(
         ContractError: the planner's plan does not survive its replay.
     """
     if planner is None:
-        planner = getattr(problem, "semantics", Semantics()).planner
+        planner = suited_planner(problem)
     options: dict[str, Any] = {"planner": planner, "prior": prior, "budget": budget, "rng": rng, "oracle": oracle}
     return plans(problem, k=None, side=side, **options)[0]
+
+
+def suited_planner(problem: Problem) -> str:
+    """The name of the planner that suits a problem: greedy search where actions may be done again, else its own."""
+    if isinstance(problem, Problem) and problem.ground() is problem.symbols and problem.symbols.repeating:
+        return "greedy"
+    return getattr(problem, "semantics", Semantics()).planner
 
 
 def plans(

@@ -103,6 +103,11 @@ class BestFirst(TwoSidedSearchPlanner, KBestSearchPlanner):
         return sorted(results, key=lambda result: result.cost or 0.0)
 
 
+def greedy_best_first(*, heuristic: str | None = None) -> BestFirst:
+    """Greedy best-first search: a plan soon, which need not be a cheap one."""
+    return BestFirst(priority="greedy", heuristic=heuristic)
+
+
 @dataclass(slots=True, eq=False)
 class _Node(Node):
     path_cost: float = 0.0

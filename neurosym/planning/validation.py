@@ -25,10 +25,12 @@ def validate(problem: Problem, order: Sequence[str], motions: Sequence[StepMotio
     if not isinstance(order, Sequence):
         raise InputError(f"Expected an order as a list of names of action primitives; got {order!r}.")
     check_motions(motions, len(order))
-    ground = {name: problem.meant_by(name) if isinstance(name, str) else None for name in dict.fromkeys(order)}
-    for name, meant in ground.items():
+    ground: dict[str, tuple[Action, dict[str, str]]] = {}
+    for name in order:
+        meant = problem.meant_by(name) if isinstance(name, str) else None
         if meant is None:
             raise UnknownNameError("action primitive", name, problem.actions)
+        ground[name] = meant
     replayed = problem.semantics.replay(problem, order, motions)
     if replayed is not None:
         return replayed
@@ -89,9 +91,7 @@ def validate(problem: Problem, order: Sequence[str], motions: Sequence[StepMotio
         return effects
 
     for step, name in enumerate(order):
-        meant = ground[name]
-        assert meant is not None
-        action, binding = meant
+        action, binding = ground[name]
         if name in done and action.once:
             # What the domain itself says of doing it again, a tower that comes down for instance, is worth hearing.
             again = failure([p.bind(binding) for p in (*action.pre, *action.conditions)])
