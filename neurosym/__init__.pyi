@@ -46,6 +46,7 @@ from .pddl.reading import (
     to_unified_planning as to_unified_planning,
 )
 from .pipeline import count_plans as count_plans, plans as plans, solve as solve
+from .planning.action_elimination import without_needless as without_needless
 from .planning.budget import Budget as Budget
 from .planning.order_scores import OrderScores as OrderScores
 from .planning.planner import Planner as Planner, PlannerTraits as PlannerTraits

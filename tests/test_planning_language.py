@@ -110,6 +110,20 @@ def test_what_is_needed_twice_is_done_twice_and_a_loop_is_no_endless_search():
         assert ns.solve(never, planner=planner).status is ns.Status.UNSOLVABLE
 
 
+def test_steps_that_a_plan_does_not_need_are_left_out():
+    holding, away = ns.Fluent("holding", block), ns.Fluent("away", block)
+    pick = ns.Action("pick", x, pre=[~ns.exists(y, holding(y))], eff=[holding(x)])
+    put = ns.Action("put", x, pre=[holding(x)], eff=[~holding(x)])
+    turn = ns.Action("turn", x, y, pre=[holding(x), x != y], eff=[away(y)])
+    tools = ns.Domain("tools", fluents=[holding, away], actions=[pick, put, turn])
+    problem = tools.problem(objects={block: "abc"}, init=[], goal=[away("c"), ~holding("a")])
+    order = ["pick(b)", "put(b)", "pick(a)", "put(a)", "pick(a)", "turn(a, b)", "turn(a, c)", "put(a)", "pick(b)"]
+    assert ns.validate(problem, order)
+    assert ns.without_needless(problem, order) == ("pick(a)", "turn(a, c)", "put(a)")
+    with pytest.raises(ns.InputError, match="an order that is none"):
+        ns.without_needless(problem, order[1:])
+
+
 def test_an_action_that_is_once_is_done_once_though_nothing_spends_it():
     lit = ns.Fluent("lit", block)
     strike = ns.Action("strike", x, pre=[~lit(x)], eff=[lit(x)], once=True)
@@ -202,6 +216,8 @@ cost = ns.Function("cost", block)
         (lambda: ns.Action("a", x, eff=[hot(x)], cost=cost(x) + 1), "numeric fluents, durations"),
         (lambda: ns.Action("a", x, pre=[cost(x) >= 1], eff=[hot(x)]), "numeric fluents, durations"),
         (lambda: ns.Action("a", x, eff=[hot(x)], duration=3), "expected no duration"),
+        (lambda: ns.Domain("d", fluents=[hot], actions=[ns.Action("a", x, pre=[x != "zz"], eff=[hot(x)])]).problem(
+            objects={block: "a"}, init=[], goal=[]), "unknown object"),
         (lambda: ns.forall(clear(x)), "expected variables, then a condition"),
         (lambda: ns.when(clear(x)), "at least one effect"),
     ],

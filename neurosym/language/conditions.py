@@ -55,6 +55,11 @@ class Condition:
         """Variables that no quantifier in it binds."""
         raise NotImplementedError
 
+    def compared(self) -> Iterator[str]:
+        """Names of objects in equalities."""
+        parts: tuple[object, ...] = getattr(self, "parts", (getattr(self, "body", None),))
+        return (name for part in parts if isinstance(part, Condition) for name in part.compared())
+
 
 @dataclass(frozen=True, slots=True)
 class And(Condition):
@@ -142,6 +147,9 @@ class Equality(Condition):
 
     def variables(self) -> Iterator[Variable]:
         return (term for term in (self.left, self.right) if not isinstance(term, str))
+
+    def compared(self) -> Iterator[str]:
+        return (term for term in (self.left, self.right) if isinstance(term, str))
 
     def __str__(self) -> str:
         return f"{self.left} {'==' if self.positive else '!='} {self.right}"

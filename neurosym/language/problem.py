@@ -94,7 +94,10 @@ class Problem:
                 )
             for literal in goal.literals():
                 self._check_atom(literal.atom, f"{place}, goal[{i}]", bound=True)
+            self._check_compared(goal, f"{place}, goal[{i}]")
         for action in self.domain.actions:
+            for condition in (*action.conditions, *(effect.condition for effect in action.conditional)):
+                self._check_compared(condition, f"{place}, action {action.name!r}")
             for where, literal in action.every_literal():
                 if any(isinstance(a, str) for a in literal.atom.args):
                     self._check_args(literal.atom, f"{place}, action {action.name!r}, {where}")
@@ -106,6 +109,12 @@ class Problem:
         if not bound and any(isinstance(a, Variable) for a in atom.args):
             raise DefinitionError(f"In {place}: expected names of objects; got the variable in {atom}.")
         self._check_args(atom, place)
+
+    def _check_compared(self, condition: Condition, place: str) -> None:
+        for name in condition.compared():
+            if name not in self.type_of:
+                known = UnknownNameError("object", name, self.type_of)
+                raise DefinitionError(f"In {place}: {condition}: unknown object. {known}")
 
     def _check_args(self, atom: Atom, place: str) -> None:
         for arg, kind in zip(atom.args, atom.predicate.types):
