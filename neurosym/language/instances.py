@@ -76,16 +76,18 @@ def instantiate(problem: Problem) -> list[Instance]:
                     f"({seen[name]} and {action.name} {binding}); give the action a label over all its parameters."
                 )
             seen[name] = f"{action.name} {binding}"
-            pre = And((*rest, *action.conditions)).bind(binding).expanded(problem.objects_of)
+            pre: Condition = And(tuple([p.bind(binding) for p in rest]))
             if action.conditions:
-                pre = simplified(pre, known)
+                whole = And((pre, *(c.bind(binding) for c in action.conditions)))
+                pre = simplified(whole.expanded(problem.objects_of), known)
             if pre is FALSE:
                 continue
             instances.append(Instance(action, binding, name, pre, problem))
-            made = instances[-1]
-            made.conditional = [(simplified(c, known), e) for c, e in made.conditional]
-            made.eff += [e for c, e in made.conditional if c is TRUE]
-            made.conditional = [(c, e) for c, e in made.conditional if c is not TRUE and c is not FALSE]
+            if action.conditional:
+                made = instances[-1]
+                settled = [(simplified(c, known), e) for c, e in made.conditional]
+                made.eff += [e for c, e in settled if c is TRUE]
+                made.conditional = [(c, e) for c, e in settled if c is not TRUE and c is not FALSE]
         if len(instances) > MAX_GROUND_ACTIONS:
             raise DefinitionError(
                 f"In problem {problem.name!r}, action {action.name!r}: more than {MAX_GROUND_ACTIONS:,} ground "
