@@ -70,7 +70,7 @@ docs: $(STAMP)
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
 
 bench: $(STAMP)
-	@for file in benchmarks/*.py; do echo "== $$file"; OMP_NUM_THREADS=1 $(BIN)/python $$file || exit 1; done
+	@for file in benchmarks/*.py; do echo "== $$file"; NEUROSYM_KEEP=0 OMP_NUM_THREADS=1 $(BIN)/python $$file || exit 1; done
 
 # What is installed now becomes what is pinned. GPU libraries follow from torch and are left to it.
 constraints: $(STAMP)

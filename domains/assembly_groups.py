@@ -22,8 +22,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from domains.assembly_scope import covering
 from domains.assembly_splits import Block, Splitter
-from domains.assembly_why import explain_groups
+from domains.assembly_why import explain_groups, falls_at_first, together
 from neurosym.errors import InputError
 from neurosym.geometry.grouping import need_not_part
 from neurosym.geometry.queries import AssemblyGeometry
@@ -162,6 +163,13 @@ class GroupSemantics(Semantics):
         return Verdict(answer.stands, () if answer.stands else falling, "" if answer.stands else sentence)
 
     def refute(self, problem: Problem) -> WhyNot | None:
+        if problem.symbols.is_goal(problem.symbols.initial):
+            return None
+        return covering(
+            problem, self.setting, together(falls_at_first(self.geometry, self.setting), self._interlock(problem))
+        )
+
+    def _interlock(self, problem: Problem) -> WhyNot | None:
         """A proof that some block never comes apart, even without gravity, where any order of splits will do."""
         if self.setting.paths == "any" and self.geometry.cells is None:
             return None  # the searches for paths prove nothing
@@ -210,7 +218,8 @@ class GroupSemantics(Semantics):
             state = answer.state
         refused = {a: search.attempt(state, a) for a in search.candidates(state)}
         stuck = {search.actions[a]: r for a, r in refused.items() if isinstance(r, Rejection)}
-        return explain_groups(self.geometry, self.setting, tuple(done), search.blocks(state), stuck)
+        why = explain_groups(self.geometry, self.setting, tuple(done), search.blocks(state), stuck)
+        return covering(problem, self.setting, why)
 
 
 class GroupSearch:

@@ -13,6 +13,7 @@ from neurosym.geometry.step_motion import StepMotion
 from neurosym.language import Derived, Fluent, State
 from neurosym.language.predicates import stands
 from neurosym.language.search_problem import Verdict
+from neurosym.language.travel import remade
 from neurosym.support.arrays import Array
 from neurosym.support.words import listed
 
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from domains.assembly import Setting
 
 
+@remade
 def drawn_out(setting: Setting, leave: Derived, present: Fluent) -> Derived:
     """``drawn_out(p)``: part p can leave (see `leave`); the others stand while it is drawn, and without it."""
 

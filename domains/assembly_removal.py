@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 from domains.assembly_paths import NoWay, check_motion, way_out
 from domains.assembly_pull import drawn_out
+from domains.assembly_scope import covering
 from domains.assembly_targets import Relaxation
-from domains.assembly_why import explain_building, explain_removal, refute_removal
+from domains.assembly_twins import twins
+from domains.assembly_why import explain_building, explain_removal, falls_at_first, refute_removal, together
 from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.grouping import need_not_part
 from neurosym.geometry.queries import AssemblyGeometry
@@ -20,6 +22,7 @@ from neurosym.language.search_problem import RelaxedPlan, Verdict
 from neurosym.language.semantics import Semantics
 from neurosym.language.state import BitState
 from neurosym.language.terms import Literal
+from neurosym.language.travel import remade
 from neurosym.support.words import listed
 
 if TYPE_CHECKING:
@@ -91,23 +94,32 @@ class RemovalSemantics(Semantics):
         number = {name: action for action, name in enumerate(ground.actions)}
         return RelaxedPlan(count, tuple(number[names[part]] for part in order))
 
+    def interchangeable(self, problem: Problem) -> Sequence[Sequence[str]]:
+        return twins(self.relaxation.geometry, self.setting, self.relaxation)
+
     def side(self, problem: Problem) -> str:
         """What cannot be taken apart cannot be built either, and where little is there that is often seen sooner."""
         return "both"
 
     def refute(self, problem: Problem) -> WhyNot | None:
         assert problem.geometry is not None
-        return refute_removal(problem.geometry, self.setting)
+        if problem.symbols.is_goal(problem.symbols.initial):
+            return None
+        at_first = falls_at_first(problem.geometry, self.setting)
+        return covering(problem, self.setting, together(at_first, refute_removal(problem.geometry, self.setting)))
 
     def explain(self, problem: Problem, done: Sequence[str]) -> WhyNot | None:
         assert problem.geometry is not None
-        return explain_removal(problem.geometry, self.setting, problem.before, tuple(done))
+        why = explain_removal(problem.geometry, self.setting, problem.before, tuple(done))
+        return covering(problem, self.setting, why)
 
     def explain_from_goal(self, problem: Problem, undone: Sequence[str]) -> WhyNot | None:
         assert problem.geometry is not None
-        return explain_building(problem.geometry, self.setting, problem.before, tuple(undone))
+        why = explain_building(problem.geometry, self.setting, problem.before, tuple(undone))
+        return covering(problem, self.setting, why)
 
 
+@remade
 def can_leave(setting: Setting) -> Derived:
     """``free(p)``: part p can leave, along a straight line or else, if paths are asked for, along a path."""
     straight = predicates.free(present, directions=setting.directions)
@@ -130,6 +142,7 @@ def can_leave(setting: Setting) -> Derived:
     return Derived("free", [part], ask, check=check, formula=straight.formula if setting.paths == "straight" else None)
 
 
+@remade
 def need_not_separate(assembly: Assembly) -> Derived:
     """``need_not_separate()``: nothing but fixed parts is left, or all that is left is within one piece group."""
 
@@ -142,6 +155,7 @@ def need_not_separate(assembly: Assembly) -> Derived:
     return Derived("need_not_separate", [], ask)
 
 
+@remade
 def stands_at_first(setting: Setting) -> Derived:
     """``stands()``: the whole stands before anything is taken out. Afterwards each removal has seen to it."""
 

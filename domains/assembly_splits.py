@@ -6,7 +6,8 @@ parts), and then what stays of it must stand, too; or it is in the hand, without
 Along one direction, what leaves is closed under "hits": the smallest group that holds a part is the closure of that
 part. Either the asked part's closure leaves the anchor, or the anchor's half leaves the asked part, whose smallest
 half then is its closure under "is hit by". So if a block comes apart at all along one of the directions, with some part
-and its anchor on different sides, that part's closure says so.
+and its anchor on different sides, that part's closure says so. Of all these halves the smallest leaves: what is named
+after a screw moves the screw, and the rest of the machine only where nothing else is possible.
 """
 
 from __future__ import annotations
@@ -14,6 +15,8 @@ from __future__ import annotations
 import heapq
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from domains.assembly_paths import NoWay, check_motion, separation, way_out
 from domains.assembly_pull import checked_while_drawn, stands_while_drawn
@@ -54,9 +57,13 @@ class Splitter:
     def __init__(self, geometry: AssemblyGeometry, setting: Setting) -> None:
         self.geometry, self.assembly, self.setting = geometry, geometry.assembly, setting
         self.graph = geometry.blocking(setting.directions)
+        vectors = np.asarray(self.graph.vectors)
+        back = np.abs(vectors[:, None] + vectors[None]).max(axis=2) < 1e-9
+        #: For each direction the number of the one the other way, or -1.
+        self.opposite = np.where(back.any(axis=1), back.argmax(axis=1), -1)
 
     def split(self, block: Block, part: int, anchor: int) -> Verdict:
-        """The smallest half with `part`, without the parts in `anchor` (a bitset), that comes off.
+        """The smallest half that comes off, so that `part` and the parts in `anchor` (a bitset) are on different sides.
 
         Returns:
             A verdict: its motion is that of the half that leaves; where there is none, what `because` names keeps the
@@ -127,12 +134,14 @@ class Splitter:
             with_part = 0
         if block.stands and anchor & self.assembly.fixed_mask:
             return with_part, 0
+        if not block.stands and self.opposite[d] >= 0:
+            return with_part, 0  # in the hand it is all one which half moves: the part's own does, the other way
         staying = self.graph.carried(1 << part, d, block.parts, backwards=True)
         return with_part, 0 if staying & anchor else block.parts & ~staying
 
     def _push(self, queue: list[tuple[int, int, int, Half]], half: Half, kind: int, block: Block, part: int) -> None:
-        side = half.leaving if half.leaving >> part & 1 else block.parts & ~half.leaving
-        heapq.heappush(queue, (side.bit_count(), kind * len(self.graph.vectors) + half.direction, kind, half))
+        order = kind * len(self.graph.vectors) + half.direction
+        heapq.heappush(queue, (half.leaving.bit_count(), order, kind, half))
 
     def _standing(self, block: Block, motion: StepMotion) -> Verdict:
         """Whether the rest stands without what leaves by a motion, and if asked for while it does; with that motion."""

@@ -11,7 +11,7 @@ from __future__ import annotations
 import heapq
 from collections.abc import Iterable
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from neurosym.geometry.queries import AssemblyGeometry
 from neurosym.support.bitsets import bits
@@ -38,6 +38,10 @@ class Relaxation:
     ) -> None:
         self.geometry, self.setting, self.targets, self.before = geometry, setting, targets, tuple(before)
         self._known: dict[int, tuple[int, tuple[int, ...]]] = {}
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copies sent to other processes leave the answers behind."""
+        return Relaxation, (self.geometry, self.setting, self.targets, self.before)
 
     @cached_property
     def _ways(self) -> list[list[int]]:
@@ -90,6 +94,27 @@ class Relaxation:
                 changed |= common != found[p]
                 found[p] = common
         return found
+
+    @cached_property
+    def _needing(self) -> list[int]:
+        """For each part the parts that have a way for which it must be out: a bitset."""
+        found = [0] * len(self.geometry)
+        for part, own in enumerate(self._ways):
+            for q in {q for way in own for q in bits(way)}:
+                found[q] |= 1 << part
+        return found
+
+    def may_swap(self, one: int, other: int) -> bool:
+        """Whether all ways of all parts stay as they are when two parts are swapped."""
+        both = 1 << one | 1 << other
+
+        def swapped(ways: list[int]) -> set[int]:
+            return {w ^ both if (w & both).bit_count() == 1 else w for w in ways}
+
+        concerned = (self._needing[one] | self._needing[other]) & ~both
+        return swapped(self._ways[one]) == set(self._ways[other]) and all(
+            swapped(self._ways[p]) == set(self._ways[p]) for p in bits(concerned)
+        )
 
     def smallest(self, there: int) -> tuple[int, tuple[int, ...]]:
         """Of the parts in `there`, how many must go at least until no target is there, and numbers of such, in order.

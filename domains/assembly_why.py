@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from domains.assembly_paths import NoWay, way_out
 from domains.assembly_pull import drawn_part
 from neurosym.geometry.grouping import need_not_part
 from neurosym.geometry.queries import AssemblyGeometry
+from neurosym.geometry.stability.holding import all_falling
 from neurosym.geometry.step_motion import StepMotion
 from neurosym.language.explanation import Blocked, Cycle, Fall, WhyNot, blockers_of, smallest_cycle
 from neurosym.language.predicates import losses
@@ -46,6 +48,22 @@ def refute_removal(geometry: AssemblyGeometry, setting: Setting) -> WhyNot | Non
         cycle=smallest_cycle(graph, kept),
         relaxed=setting.gravity,
     )
+
+
+def falls_at_first(geometry: AssemblyGeometry, setting: Setting) -> WhyNot | None:
+    """That the whole does not stand before anything is taken out, where it has to; None: it does."""
+    whole = (1 << len(geometry)) - 1
+    if not setting.gravity or (answer := geometry.stability.standing_when_held(whole, setting.held)).stands:
+        return None
+    falls = (fall(geometry, whole, 0, all_falling(geometry.stability.standing, whole, answer.falling), setting.held),)
+    return WhyNot(after=(), left=geometry.names, falls=falls)
+
+
+def together(at_first: WhyNot | None, interlock: WhyNot | None) -> WhyNot | None:
+    """Both reasons in one; None where there is neither."""
+    if at_first is None or interlock is None:
+        return at_first or interlock
+    return replace(interlock, falls=(*at_first.falls, *interlock.falls))
 
 
 def explain_removal(
@@ -128,7 +146,7 @@ def fall(
     lost, movement = losses(geometry, moving, leaving), ""
     if told and geometry.rule == "springs":
         first = next(iter(geometry.springs.movements(there & ~leaving)), None)
-        movement = first.sentence(geometry.names) if first else ""
+        movement = replace(first, lost=first.lost & ~leaving).sentence(geometry.names) if first else ""
     return Fall(geometry.in_mask(leaving), geometry.in_mask(moving), lost, held, movement)
 
 
@@ -165,7 +183,11 @@ def explain_groups(
         if cycle is not None:
             cycles.append(cycle)
         if block.stands and setting.gravity:
-            falls += _falls_of_groups(geometry, setting, block, names)
+            answer = geometry.stability.standing_when_held(block.parts, setting.held)
+            if answer.stands:
+                falls += _falls_of_groups(geometry, setting, block, names)
+            else:
+                falls.append(fall(geometry, block.parts, 0, answer.falling, setting.held))
     return WhyNot(
         after=done,
         left=geometry.in_mask(left),

@@ -17,7 +17,6 @@ from functools import cache, reduce
 from itertools import combinations
 from operator import or_
 
-import networkx as nx
 import numpy as np
 
 from neurosym.errors import AssemblyError
@@ -31,6 +30,7 @@ from neurosym.geometry.shapes import Box
 from neurosym.language import Derived, Fluent, State
 from neurosym.language.formulas import AnyOf, Way
 from neurosym.language.search_problem import Verdict
+from neurosym.language.travel import remade
 from neurosym.support.arrays import Array
 from neurosym.support.bitsets import bits
 
@@ -78,6 +78,7 @@ def _stacks(world: AssemblyGeometry) -> Stacks:
     return Stacks(tuple(own), tuple(o & ~m for o, m in zip(over, own)), tuple(owners))
 
 
+@remade
 def keeps_standing(present: Fluent, rule: str) -> Derived:
     """``keeps_standing(p)``: at most `MAY_MOVE` cubes move when piece p is deleted."""
     limit = MAY_MOVE[rule]
@@ -186,13 +187,17 @@ def check_standing(geometry: AssemblyGeometry, rule: str) -> None:
                 )
         return
     # Whoever stands on the table, then whoever stands on those, and so on.
-    carries = nx.DiGraph()
-    carries.add_node(TABLE)
+    carries: dict[int, set[int]] = {}
     for contact in geometry.contacts:
         a, b = int(world.owners[contact.a]), TABLE if contact.b == TABLE else int(world.owners[contact.b])
         if abs(contact.normal[2]) > 0.7:
-            carries.add_edge(*((b, a) if contact.normal[2] < 0 else (a, b)))
-    if floating := set(range(len(geometry))) - nx.descendants(carries, TABLE):
+            below, above = (b, a) if contact.normal[2] < 0 else (a, b)
+            carries.setdefault(below, set()).add(above)
+    floating, reached = set(range(len(geometry))), {TABLE}
+    while reached:
+        floating -= reached
+        reached = {above for below in reached for above in carries.get(below, ())} & floating
+    if floating:
         raise AssemblyError(
             f"Piece {world.names[min(floating)]!r} is floating: nothing that it stands on reaches the table (z is up, "
             f"the table is at z = {world.ground:g}). Move it down, or leave it out."

@@ -3,12 +3,14 @@
 Pieces by Piet Hein; letters and the count of 240 as in Berlekamp, Conway, Guy, "Winning Ways", vol. 2.
 """
 
+import hashlib
 import warnings
 from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
+from neurosym.support import disk_cache
 from neurosym.support.arrays import Numbers
 
 Cell = tuple[int, int, int]
@@ -63,9 +65,24 @@ def _placements(cells: tuple[Cell, ...], side: int) -> list[Numbers]:
     return [np.array(s) for s in sorted(seen)]
 
 
+#: Every way to fill the cube: 240 cubes in 48 poses (Berlekamp, Conway, Guy).
+N_COVERS = 11_520
+
+
 @cache
 def _covers() -> NDArray[np.int8]:
-    """int8 (11520, 27): every way to fill the 3 x 3 x 3 cube; entries are numbers of pieces."""
+    """int8 (11520, 27): every way to fill the 3 x 3 x 3 cube; entries are numbers of pieces. Kept on disk."""
+    digest = hashlib.sha256(repr(("covers", 1, PIECES)).encode()).hexdigest()
+    path = disk_cache.cache_folder() / "covers" / digest
+    covers = np.empty((N_COVERS, 27), dtype=np.int8)
+    if not disk_cache.load(path, covers):
+        covers = exact_covers()
+        disk_cache.store(path, covers)
+    return covers
+
+
+def exact_covers() -> NDArray[np.int8]:
+    """The same, searched: importing the solver takes longer than a plan."""
     rows, owner = [], []
     for number, cells in enumerate(PIECES.values()):
         for placement in _placements(cells, 3):
@@ -76,8 +93,8 @@ def _covers() -> NDArray[np.int8]:
             owner.append(number)
     matrix = np.array(rows)
     with warnings.catch_warnings():
-        # Of numba, when it first compiles xcover, about a hash in there; it is not the user's business.
-        warnings.filterwarnings("ignore", message="unsafe cast from uint64")
+        # Of numba, when it first compiles xcover, about a hash in there, in bold; it is not the user's business.
+        warnings.filterwarnings("ignore", message=".*unsafe cast from uint64")
         from xcover import covers_bool
 
         covers = list(covers_bool(matrix))

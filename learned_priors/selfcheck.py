@@ -1,9 +1,14 @@
 """Does torch work here? `neurosym doctor` asks, through the entry point group ``neurosym.checks``."""
 
+from neurosym.errors import MissingDependencyError
+
 
 def torch_works() -> str:
     """Solve a small least-squares problem by gradient descent; returns one line about it, raises where it fails."""
-    import torch
+    try:
+        import torch
+    except ModuleNotFoundError as error:
+        raise MissingDependencyError.of("torch", "trained priors need", "learned") from error
 
     # A generator of our own: no global seed is touched.
     inputs = torch.randn(64, 3, generator=torch.Generator().manual_seed(0))

@@ -45,7 +45,12 @@ from .pddl.reading import (
     from_unified_planning as from_unified_planning,
     to_unified_planning as to_unified_planning,
 )
-from .pipeline import count_plans as count_plans, plans as plans, solve as solve
+from .pipeline import (
+    count_plans as count_plans,
+    order_marginals as order_marginals,
+    plans as plans,
+    solve as solve,
+)
 from .planning.action_elimination import without_needless as without_needless
 from .planning.budget import Budget as Budget
 from .planning.order_scores import OrderScores as OrderScores

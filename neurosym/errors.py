@@ -17,6 +17,7 @@ exception: it is a `PlanResult`.
 
 import difflib
 from collections.abc import Iterable
+from typing import Self
 
 #: Characters of a message: of a longer one the middle is left out.
 LONGEST = 1_000
@@ -77,3 +78,9 @@ class ContractError(NeurosymError):
 
 class MissingDependencyError(NeurosymError, ImportError):
     """An optional package is not installed; the message says how to get it."""
+
+    @classmethod
+    def of(cls, package: str, purpose: str, extra: str, distribution: str = "neurosym-assembly") -> Self:
+        """For a package that an extra of a distribution has; `purpose` goes on after "which"."""
+        install = f"pip install '{distribution}[{extra}]', or from the repository pip install '.[{extra}]'"
+        return cls(f"Expected {package}, which {purpose}; it is not installed. Install the extra `{extra}`: {install}.")

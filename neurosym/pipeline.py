@@ -21,6 +21,7 @@ from neurosym.planning.prior import Prior
 from neurosym.planning.result import OrderCount, PlanResult, Status
 from neurosym.planning.validation import confirm, replay, validate
 from neurosym.registry import load_planner, load_prior
+from neurosym.support.arrays import Array
 from neurosym.support.deadline import OutOfTime, within
 
 #: Seconds beyond the budget for looking over what came out of it: a plan's replay, or why there is none.
@@ -87,7 +88,6 @@ def plans(
     """The k best plans, the likeliest first (planners whose traits say `k_best`); with None one, as `solve`."""
     searcher = load_planner(planner)
     generator = guarded(problem, searcher, k, budget, rng)
-    side = side_of(problem, searcher, side, alone=k is None and oracle == "geometry")
     budget, by_geometry, start = budget or Budget(), oracle == "geometry", time.perf_counter()
 
     def spent() -> float:
@@ -95,9 +95,11 @@ def plans(
 
     try:
         with within(_with_grace(budget)):
+            side = side_of(problem, searcher, side, alone=k is None and by_geometry)
             scores = advice(problem, prior)
             if by_geometry and (why_not := problem.semantics.refute(problem)) is not None:
-                none = PlanResult(Status.UNSOLVABLE, None, 0, 0, 0, spent(), why_not=why_not)
+                known: dict[str, Any] = {"why_not": why_not, "n_actions": len(problem.actions)}
+                none = PlanResult(Status.UNSOLVABLE, None, 0, 0, 0, spent(), **known)
                 return [none] if k is None else []
             with open_oracle(problem, oracle) as search:
                 asked: dict[str, Any] = {"k": k, "budget": budget.less(spent()), "rng": generator, "oracle": oracle}
@@ -153,7 +155,8 @@ def _with_grace(budget: Budget | None) -> float | None:
 
 
 def _bounded(search: SearchProblem[Any], result: PlanResult) -> PlanResult:
-    """The result with whether it has the fewest actions, where the problem has a bound on them."""
+    """The result with how many actions there are, and whether it has the fewest, where the problem has a bound."""
+    result = replace(result, n_actions=len(search.actions))
     known: RelaxedPlan | None = search.relaxed_plan(search.initial) if hasattr(search, "relaxed_plan") else None
     if result.plan is None or known is None:
         return result
@@ -195,13 +198,21 @@ def count_plans(problem: Problem) -> int:
     return orders
 
 
+def order_marginals(problem: Problem) -> Array:
+    """float64 (N, N): in what share of all orders that solve a problem action j is step i; exact, rows sum to 1.
+
+    Labels for training: a network that is shown single orders learns their accidents by heart.
+    """
+    return _counter().order_marginals(problem.ground())
+
+
 def count_orders(problem: Problem, *, budget: Budget | None = None) -> OrderCount:
     """The same within a budget, whose end is a result: no number. A problem that is refuted at once has none."""
     budget, start = budget or Budget(), time.perf_counter()
     try:
         with within(_with_grace(budget)):
             if problem.semantics.refute(problem) is not None:
-                return OrderCount(0, True, 0, time.perf_counter() - start)
+                return OrderCount(0, True, 0, time.perf_counter() - start, 0)
             search = problem.ground()
             return _counter().count_orders(search, budget=budget.less(time.perf_counter() - start))
     except OutOfTime:

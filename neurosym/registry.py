@@ -4,13 +4,14 @@ Wherever a name is taken, an object is too.
 """
 
 import inspect
+import re
 from collections.abc import Callable
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Any, TypeVar
 
-from neurosym.errors import ContractError, InputError, UnknownNameError
+from neurosym.errors import ContractError, InputError, MissingDependencyError, UnknownNameError
 from neurosym.language.problem_family import ProblemFamily
 from neurosym.planning.planner import Planner
 from neurosym.planning.prior import Prior
@@ -24,6 +25,16 @@ _REINSTALL = "A new entry point shows only after the package that declares it is
 @cache
 def _entry_points(group: str) -> dict[str, EntryPoint]:
     return {e.name: e for e in entry_points(group=group)}
+
+
+def _extra_with(entry: EntryPoint, module: str) -> str | None:
+    """The smallest extra of an entry point's distribution that has a module, going by names of requirements."""
+    extras: dict[str, list[str]] = {}
+    for requirement in (entry.dist and entry.dist.requires) or ():
+        if found := re.match(r"([\w.-]+).*\bextra == ['\"]([^'\"]+)", requirement):
+            extras.setdefault(found[2], []).append(re.sub(r"[-_.]+", "_", found[1]).lower())
+    wanted = module.partition(".")[0].lower()
+    return min((e for e in extras if wanted in extras[e]), key=lambda e: len(extras[e]), default=None)
 
 
 def domain_names() -> list[str]:
@@ -75,7 +86,14 @@ def _make(group: str, kind: str, name: object, base: Callable[..., T], options: 
     known = _entry_points(group)
     if not isinstance(name, str) or name not in known:
         raise UnknownNameError(kind, name, known, hint=f"{hint} {_REINSTALL}".strip())
-    factory = known[name].load()
+    try:
+        factory = known[name].load()
+    except ModuleNotFoundError as error:
+        if extra := _extra_with(known[name], error.name or ""):
+            purpose = f"the {kind} {name!r} needs"
+            distribution = getattr(known[name].dist, "name", "")
+            raise MissingDependencyError.of(error.name or "", purpose, extra, distribution) from error
+        raise
     try:
         inspect.signature(factory).bind(**options)
     except TypeError as error:

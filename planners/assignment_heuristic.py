@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linear_sum_assignment
 
 from neurosym.planning.order_scores import LOG_FLOOR, OrderScores
 
@@ -94,6 +93,8 @@ def _forced(costs: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np
     shortest path of evictions that ends in the column that the first row gave up. Since the assignment is
     optimal, no cycle of evictions gains, and Bellman-Ford settles in as many rounds as the longest path.
     """
+    from scipy.optimize import linear_sum_assignment
+
     columns = linear_sum_assignment(costs)[1].astype(np.int64)
     rows = np.arange(len(columns))
     total = float(costs[rows, columns].sum())

@@ -102,10 +102,11 @@ class SearchContext:
         candidates = sorted(self.log.candidates(state))
         if self.log.timed_out:
             raise BudgetSpent
-        for action in candidates:
+        # From the goal the last one first: so both sides do those of a class in one order, and their states may meet.
+        for action in reversed(candidates) if self.from_goal else candidates:
             if not used >> action & 1:
                 first.setdefault(self.classes[action], action)
-        return list(first.values())
+        return sorted(first.values())
 
     def attempt(self, node: Node, action: int) -> Step[Any] | Rejection:
         """The oracle's answer, which is asked once for each state and action."""

@@ -6,7 +6,9 @@ interchangeable actions count once.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -102,12 +104,13 @@ def count_orders(problem: SearchProblem[Any], *, budget: Budget | None = None) -
         return _count_from_both(full, empty)
     log = full.log
     leading: dict[tuple[Any, int], int] = {(full.problem.initial, 0): 1}  # how many orders lead there
-    orders = states = 0
+    orders = told_apart = states = 0
     while leading:
         waiting = {}
         for (state, used), count in leading.items():
             if full.problem.is_goal(state):
                 orders += count
+                told_apart += count * _ways_to_name(full.classes, used)
             else:
                 waiting[state, used] = count
         states += len(leading)
@@ -115,7 +118,14 @@ def count_orders(problem: SearchProblem[Any], *, budget: Budget | None = None) -
             leading = _next_layer(full, waiting)
         except BudgetSpent:
             return OrderCount(None, False, log.expansions, log.seconds)
-    return OrderCount(orders, log.all_proved, states, log.seconds)
+    return OrderCount(orders, log.all_proved, states, log.seconds, told_apart)
+
+
+def _ways_to_name(classes: Sequence[int], used: int) -> int:
+    """In how many ways the actions of an order may be named, those of a class being interchangeable."""
+    there = Counter(classes)
+    done = Counter(label for action, label in enumerate(classes) if used >> action & 1)
+    return math.prod(math.perm(there[label], count) for label, count in done.items())
 
 
 def _count_from_both(full: SearchContext, empty: SearchContext) -> OrderCount:
@@ -135,7 +145,8 @@ def _count_from_both(full: SearchContext, empty: SearchContext) -> OrderCount:
     ends = {state: count for (state, _), count in layers[empty].items()}
     orders = sum(count * ends.get(state, 0) for (state, _), count in layers[full].items())
     looked_at = log.expansions + len(layers[full])
-    return OrderCount(orders, log.all_proved and empty.log.all_proved, looked_at, log.seconds)
+    told_apart = orders * _ways_to_name(full.classes, (1 << left) - 1)
+    return OrderCount(orders, log.all_proved and empty.log.all_proved, looked_at, log.seconds, told_apart)
 
 
 def _next_layer(context: SearchContext, layer: dict[tuple[Any, int], int]) -> dict[tuple[Any, int], int]:

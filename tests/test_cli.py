@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -284,7 +285,8 @@ def test_train_then_compare_with_the_file(demonstrations, tmp_path, capfd):
     arguments = ["train", "soma", "--prior", "sinkhorn-paper", "--demos", demonstrations, "--epochs", "3"]
     assert call(*arguments, "--out", weights) == 0
     said = capfd.readouterr()
-    assert "loss" in said.err, "early figures"
+    assert "held out" in said.err, "early figures"
+    assert re.search(r"On 20 problems kept from training: \d\.\d+ refusals a plan, without a prior \d", said.err)
     assert str(weights) in said.out
     assert [p.name for p in tmp_path.iterdir()] == ["mine.safetensors"], "the checkpoint goes in the end"
     asked = ["--problems", "3", "--planner", "backtracking", "--prior", weights, "--json", "--workers", "1"]

@@ -145,7 +145,8 @@ def test_no_plan_is_explained_and_has_its_exit_code(capsys, chain):
 def test_orders_are_counted_within_a_budget(capsys, gate, chain):
     code, found, _ = answer(capsys, "count", gate)
     assert (code, found["orders"], found["exact"]) == (0, 2, True)
-    assert answer(capsys, "count", gate, "--no-gravity")[1]["orders"] == 6
+    found = answer(capsys, "count", gate, "--no-gravity")[1]
+    assert (found["orders"], found["told_apart"]) == (3, 6)  # the posts may be swapped
     assert answer(capsys, "count", chain, "--no-gravity")[1]["orders"] == 0
     code, found, _ = answer(capsys, "count", gate, "--expansions", "1")
     assert (code, found["orders"], found["exact"]) == (23, None, False)

@@ -180,3 +180,19 @@ def test_tools_are_changed_once_and_the_film_shows_every_step(capsys):
     assert [w for w in words if w.startswith("pick_tool")] == [s for s in result.plan if s.startswith("pick_tool")]
     assert staging.there(11) == ("box",)
     assert sum(1 for _ in frames(staging, size=(80, 60))) > 2 * len(words)
+
+
+def test_the_notebook_runs_and_shows_tables_and_figures(tmp_path):
+    """As a notebook runs it, in a kernel of its own: results are tables, figures are pictures, no cell fails."""
+    nbclient = pytest.importorskip("nbclient", reason="nbclient is not installed (extra dev)")
+    pytest.importorskip("ipykernel", reason="ipykernel is not installed (extra dev)")
+    nbformat = pytest.importorskip("nbformat")
+    notebook = nbformat.read(FOLDER / "stool.ipynb", as_version=4)
+    ran = nbclient.NotebookClient(notebook, timeout=120, resources={"metadata": {"path": str(tmp_path)}}).execute()
+    outputs = [output for cell in ran.cells if cell.cell_type == "code" for output in cell.outputs]
+    assert not [o for o in outputs if o.output_type == "stream" and o.name == "stderr"]
+    shown = [set(o.data) for o in outputs if o.output_type == "execute_result"]
+    assert [("text/html" in s, "image/png" in s) for s in shown] == [
+        (True, False), (True, False), (True, False), (False, True), (True, False), (True, False), (False, True),
+        (False, True),
+    ]  # fmt: skip

@@ -52,6 +52,22 @@ def test_planning_with_geometry_loads_no_network_library_and_no_figures():
     assert loaded_by(code) == {"fcl"}
 
 
+#: What takes a command longer to load than to answer.
+SLOW = ("numba", "xcover", "scipy.optimize", "scipy.spatial", "networkx", "pandas", "torch", "pybullet", "matplotlib")
+
+
+@pytest.mark.parametrize("command", [["--help"], ["plan", "soma", "--problem", "17"]], ids=["help", "plan"])
+def test_a_command_that_needs_little_starts_soon(command, tmp_path, monkeypatch):
+    """The first run keeps the 240 cubes on disk and prints no dependency's warning; after it no solver is loaded."""
+    monkeypatch.setenv("NEUROSYM_CACHE", str(tmp_path / "kept"))
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "compiled"))
+    code = f"import neurosym.cli\ntry: neurosym.cli.main({command!r})\nexcept SystemExit: pass\n"
+    code += f"import sys\nprint('LOADED', *[m for m in {SLOW!r} if m in sys.modules])"
+    runs = [subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True) for _ in range(2)]
+    assert runs[0].stderr == ""
+    assert runs[1].stdout.rpartition("LOADED")[2].split() == []
+
+
 @pytest.mark.parametrize("package", ["neurosym", "planners", "learned_priors", "neurosym.simulation"])
 def test_every_public_name_exists(package):
     module = __import__(package, fromlist=["__all__"])

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 import pytest
-from matplotlib.figure import Figure
 
 from neurosym.experiments.planning_report import conclusions, methods_figure, report
 from neurosym.experiments.reporting import RECORD, Drawn
 from neurosym.experiments.reproduce import Experiment
+from neurosym.plotting.style import Figure
 
 SOMA = Experiment("soma", splits=2, styles=("clean",), methods=("sinkhorn", "sinkhorn-paper", "tcn-paper"))
 FAILURES = {"sinkhorn": 0.05, "sinkhorn-paper": 0.3, "tcn-paper": 0.4, "random": 0.9, "blind": 0.7}

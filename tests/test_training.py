@@ -7,7 +7,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 import torch
 
+import neurosym as ns
 from learned_priors.losses import cross_entropy, loss_of, squared_error, summed_by_class, targets_of
 from learned_priors.metrics import step_matches, whole_order_accuracy
 from learned_priors.network_prior import NetworkPrior
@@ -22,6 +23,7 @@ from learned_priors.networks import Logits
 from learned_priors.recipes import RECIPES
 from learned_priors.sinkhorn import log_sinkhorn
 from learned_priors.training import FitProgress
+from neurosym.commands.learn import worth
 from neurosym.errors import CheckpointError, InputError, UnknownNameError
 from neurosym.language.demonstrations import Demonstrations
 
@@ -266,3 +268,26 @@ def test_metrics_count_whole_orders_and_steps() -> None:
 def test_an_unknown_recipe_is_named() -> None:
     with pytest.raises(UnknownNameError, match="Did you mean 'sinkhorn'"):
         NetworkPrior("sinkhron")
+
+
+def test_what_a_prior_saves_is_told_and_one_that_harms_is_warned_of() -> None:
+    """Soma under `strict`: the share of orders in which each piece has each step, and the same upside down."""
+    problems = [ns.load_domain("soma").problem(n, collapse="strict") for n in (3, 17)]
+
+    class Shares(ns.Prior):
+        def __init__(self, backwards: bool) -> None:
+            self.backwards = backwards
+
+        def scores(self, problems: Sequence[ns.Problem]) -> list[ns.OrderScores]:
+            tables = [np.log(ns.order_marginals(p) + 1e-9) for p in problems]
+            return [ns.OrderScores(t[::-1] if self.backwards else t, p.actions) for t, p in zip(tables, problems)]
+
+    good, bad = worth(Shares(False), problems), worth(Shares(True), problems)
+    assert good.startswith("On 2 problems kept from training: ")
+    assert good.endswith(" saved.")
+    assert bad.startswith("Warning: this prior makes planning worse. On 2 problems")
+
+
+def test_shares_of_orders_sum_to_one_and_know_what_never_comes_first() -> None:
+    problem = ns.load_domain("assembly").problem(ns.Assembly.from_cells({"low": [(0, 0, 0)], "high": [(0, 0, 1)]}))
+    assert ns.order_marginals(problem).tolist() == [[0.0, 1.0], [1.0, 0.0]]

@@ -111,13 +111,11 @@ class FileOptions:
     ] = None
     up: Annotated[Literal["y", "z"] | None, typer.Option(help="What is up in the files; default z, in glTF y.")] = None
     touch: Annotated[
-        float | None,
+        str | None,
         typer.Option(
-            metavar="SHARE",
-            min=1e-6,
-            max=0.5,
+            metavar="SHARE|auto",
             help="Faces so near, or overlapping so little, touch: a share of the smallest part's extent. "
-            "Default 0.001, raised where mating faces overlap.",
+            "Default 0.001, raised where mating faces overlap; auto: raised to the play of parts, too.",
         ),
     ] = None
     friction: Annotated[
@@ -140,7 +138,18 @@ class FileOptions:
         """As the library takes them."""
         from neurosym.geometry.readers.references import Reading
 
-        return Reading(**{**vars(self), "joint": dict(map(_joint_value, self.joint or [])) or None})
+        touch = self.touch if self.touch in (None, "auto") else _share(str(self.touch))
+        return Reading(**{**vars(self), "touch": touch, "joint": dict(map(_joint_value, self.joint or [])) or None})
+
+
+def _share(text: str) -> float:
+    try:
+        share = float(text)
+    except ValueError:
+        share = -1.0
+    if not 1e-6 <= share <= 0.5:
+        raise InputError(f"Expected --touch as auto, or a share of the smallest extent, 1e-6 to 0.5; got {text!r}.")
+    return share
 
 
 def _joint_value(text: str) -> tuple[str, float]:

@@ -14,6 +14,7 @@ import typer
 
 from neurosym.commands.common import AsJson, console, print_json
 from neurosym.commands.exit_codes import UNWELL
+from neurosym.errors import MissingDependencyError
 
 DISTRIBUTION = "neurosym-assembly"
 #: The packages that make up this library; on PyPI other projects hold two of these names.
@@ -121,6 +122,8 @@ def works(name: str, check: Callable[[], str]) -> Finding:
     """Call a check; whatever it raises is the finding."""
     try:
         return Finding("works", name, True, check())
+    except MissingDependencyError as error:  # an extra that nobody asked for
+        return Finding("works", name, True, str(error))
     except Exception as error:  # whatever a broken installation raises is what the user needs to read
         remedy = f"Install it again: pip install --force-reinstall {_PACKAGE.get(name, name)}"
         return Finding("works", name, False, f"{type(error).__name__}: {error}", remedy)
@@ -190,11 +193,13 @@ def _versions() -> Iterator[Finding]:
         return
     yield Finding("installed", DISTRIBUTION, True, own)
     for requirement in needed:
-        if "extra ==" in requirement:
+        extra = "extra ==" in requirement
+        if extra and not re.search("['\"]all['\"]", requirement):
             continue
         match = re.match(r"[A-Za-z0-9._-]+", requirement)
         name = match.group() if match else requirement
         try:
             yield Finding("installed", name, True, metadata.version(name))
         except metadata.PackageNotFoundError:
-            yield Finding("installed", name, False, "missing", f'pip install "{requirement}"')
+            if not extra:
+                yield Finding("installed", name, False, "missing", f'pip install "{requirement}"')

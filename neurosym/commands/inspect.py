@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -17,7 +18,9 @@ from neurosym.commands.common import (
     problem_at,
     progress_bar,
 )
+from neurosym.commands.spent import Spent
 from neurosym.errors import InputError
+from neurosym.support.words import counted as numbered
 from neurosym.support.words import joined
 
 if TYPE_CHECKING:
@@ -72,19 +75,28 @@ def count(
     """
     from neurosym.pipeline import count_orders
     from neurosym.planning.budget import Budget
-    from neurosym.planning.result import Status
+    from neurosym.planning.result import OrderCount, Status
+    from neurosym.support.deadline import OutOfTime, within
 
-    problem = problem_at(path, files, removal.given())
-    with progress_bar(f"counting orders of {problem.name}", after=1.0):
-        counted = count_orders(problem, budget=Budget(seconds=seconds, expansions=expansions))
+    spent, counted = Spent(), OrderCount(None, False, 0, 0.0)
+    with contextlib.suppress(OutOfTime), within(seconds):
+        with spent.on("reading and geometry"):
+            problem = problem_at(path, files, removal.given())
+        with progress_bar(f"counting orders of {problem.name}", after=1.0), spent.on("counting"):
+            budget = Budget(seconds=seconds, expansions=expansions).less(spent.seconds)
+            counted = count_orders(problem, budget=budget)
+    counted = replace(counted, seconds=spent.seconds)
     if as_json:
         print_json({"path": str(path), **counted.as_json()})
     elif counted.orders is None:
-        looked = f"{counted.states:,} states in {counted.seconds:.1f} s"
+        looked = f"{numbered(counted.states, 'state')} in {spent}"
         print(f"The budget ended after {looked}, so there is no number. Give more: --seconds, --expansions.")
     else:
         least = "" if counted.exact else "At least "
-        print(f"{least}{counted.orders:,} orders ({counted.states:,} states, {counted.seconds:.2f} s)")
+        states = numbered(counted.states, "state")
+        print(f"{least}{numbered(counted.orders, 'order')} ({states}, {counted.seconds:.2f} s)")
+        if counted.told_apart not in (None, counted.orders):
+            print(f"Equal parts that may be swapped count as one; told apart, {counted.told_apart:,} orders.")
     if not counted.exact or counted.orders is None:
         raise typer.Exit((Status.OUT_OF_BUDGET if counted.orders is None else Status.GAVE_UP).exit_code)
 
@@ -150,7 +162,8 @@ def _level(problem: Problem) -> int | None:
 
 def _show(problem: Problem, inspection: Inspection) -> None:
     unit = problem.world.units or "units"
-    counts = f"{len(inspection.parts)} parts, {len(inspection.contacts)} pairs in contact"
+    pairs = f"{numbered(len(inspection.contacts), 'pair')} in contact"
+    counts = f"{numbered(len(inspection.parts), 'part')}, {pairs}"
     print(f"{problem.name}: {counts}; lengths in {unit}")
     _lines([f"{p.name}: volume {p.volume:.4g}{', fixed' if p.fixed else ''}" for p in inspection.parts], "parts")
     _lines([f"Kept together: {joined(own)}" for own in inspection.kept], "groups")

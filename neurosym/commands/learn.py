@@ -12,7 +12,14 @@ from neurosym.commands import common
 from neurosym.errors import InputError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from neurosym.language.demonstrations import Demonstrations
+    from neurosym.language.problem import Problem
+    from neurosym.planning.prior import Prior
+
+#: Problems on which a trained prior is compared with none.
+WORTH = 20
 
 
 def demos(
@@ -51,9 +58,12 @@ def train(
     ] = None,
     device: Annotated[str, typer.Option(help="cpu or cuda.")] = "cpu",
     option: common.FamilyOptions = None,
+    held_out: Annotated[
+        float, typer.Option(min=0.0, max=0.9, metavar="SHARE", help="Of the problems, kept from training and measured.")
+    ] = 0.1,
     resume: Annotated[bool, typer.Option("--resume/--no-resume", help="Go on from a run that was killed.")] = True,
 ) -> None:
-    """Train a prior, with early figures; a run that was killed goes on where it was."""
+    """Train a prior, with early figures, and say what it saves; a run that was killed goes on where it was."""
     from neurosym.registry import load_domain, load_prior
 
     _check_suffix(out, ".safetensors")
@@ -76,13 +86,35 @@ def train(
     out.parent.mkdir(parents=True, exist_ok=True)
     with warnings.catch_warnings():
         warnings.showwarning = lambda message, *_, **__: common.say(f"Note: {message}")
-        _fit(learner, given, seed=seed, epochs=epochs, device=device, checkpoint=checkpoint, resume=resume)
+        settings = common.taken_by(learner.fit, {"settings": {"held_out": held_out}} if held_out else {})
+        _fit(learner, given, seed=seed, epochs=epochs, device=device, checkpoint=checkpoint, resume=resume, **settings)
     made_here = {"split": split, "pictures": pictures, "seed": seed, **common.family_options(option)}
     learner.save(out, notes=made_here if demos_file is None else {"file": demos_file.name})
     checkpoint.unlink(missing_ok=True)
     figures = learner.header.get("training", {}) if hasattr(learner, "header") else {}
     took = f" in {figures['seconds']:.1f} s" if "seconds" in figures else ""
     print(f"{out}: {prior}, trained on {len(given)} demonstrations{took}, {out.stat().st_size / 1024:.0f} KiB")
+    problems = load_domain(domain).problems("test", split=split, **common.family_options(option))[:WORTH]
+    common.say(worth(learner, problems))
+
+
+def worth(prior: Prior, problems: Sequence[Problem]) -> str:
+    """Refusals with a prior and without one, on problems that it was not trained on, in a sentence that warns."""
+    from neurosym.pipeline import solve
+    from neurosym.planning.budget import Budget
+
+    try:
+        results = [[solve(p, prior=q, rng=0, budget=Budget(attempts=1000)) for p in problems] for q in (None, prior)]
+    except InputError as error:  # of other actions, or without pictures
+        return f"Note: what the prior saves was not measured: {error}"
+    without, guided = (sum(r.iterations for r in some) / max(len(some), 1) for some in results)
+    solved = [sum(r.solved for r in some) for some in results]
+    figures = f"{guided:.2f} refusals a plan, without a prior {without:.2f}"
+    saved = f"On {len(problems)} problems kept from training: {figures}"
+    if guided > without or solved[1] < solved[0]:
+        lost = f" ({solved[1]} are solved, without a prior {solved[0]})" if solved[1] < solved[0] else ""
+        return f"Warning: this prior makes planning worse. {saved}{lost}. Train longer, or on more demonstrations."
+    return f"{saved}: {without - guided:.2f} saved."
 
 
 def _fit(learner: Any, given: Demonstrations, **options: Any) -> None:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
-from time import perf_counter
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
@@ -25,26 +25,21 @@ from neurosym.commands.common import (
     write_json,
 )
 from neurosym.commands.plan_pddl import plan_pddl
+from neurosym.commands.plan_text import show
+from neurosym.commands.spent import Spent
+from neurosym.commands.widening import widened
 from neurosym.errors import InputError
 from neurosym.language.options import made
 from neurosym.language.problem_family import ProblemFamily
 from neurosym.plan_files.writing import problem_part, result_part
 from neurosym.support.deadline import OutOfTime, within
-from neurosym.support.words import joined
 
 if TYPE_CHECKING:
+    from neurosym.geometry.assembly import Assembly
     from neurosym.language.problem import Problem
-    from neurosym.language.search_problem import Rejection
-    from neurosym.planning.result import PlanResult
 
 #: The prior for assemblies, unless another is named.
 UNTRAINED = "outermost-first"
-
-#: Refusals shown at the end of a search that found nothing; --out keeps all.
-LAST_REFUSALS = 12
-
-#: What ended a search that did not end from its initial state.
-ENDED = {"full": "", "empty": " It was decided from the empty side.", "both": " The two sides met."}
 
 
 def plan(
@@ -98,9 +93,10 @@ def plan(
     from neurosym.planning.sturdiness import SturdyPlan, sturdiest_plan
     from neurosym.registry import load_domain, load_planner
 
-    start = perf_counter()
     if pddl is not None:
         raise typer.Exit(plan_pddl(pddl, Path(what), planner, heuristic, search, out, as_json))
+    assembly: Assembly | None = None
+    spent = Spent()
     cells = search.own_cells()
     path = _path(what, number, cells)
     family = load_domain("assembly" if path else what)
@@ -116,13 +112,15 @@ def plan(
     else:
         try:
             with within(search.seconds):
-                assembly = load_assembly(path, files)
+                with spent.on("reading"):
+                    assembly = load_assembly(path, files)
                 named = options | {"name": path.resolve().name}
-                problem = made(family.problem, assembly, options=named, whose=family.name)
+                with spent.on("contacts and blocking"):
+                    problem = made(family.problem, assembly, options=named, whose=family.name)
         except OutOfTime:
-            say(f"The budget of {search.seconds:g} seconds ended while {path} was read. Give more: --seconds.")
+            say(f"The budget of {search.seconds:g} s (--seconds) ended before there was a problem to search: {spent}.")
             raise typer.Exit(Status.OUT_OF_BUDGET.exit_code) from None
-        source = {"assembly": reference(path, files.reading(), assembly)}
+        source = {"assembly": reference(path, files.reading(), assembly), "notes": [str(n) for n in assembly.notes]}
         options = options | {"stability": problem.details["stability"]}
     prior = search.prior
     if prior is None:
@@ -138,11 +136,11 @@ def plan(
     name = settings["planner"]
     if heuristic is not None:
         settings["planner"] = load_planner(name, heuristic=heuristic)
-    settings["budget"] = budget.less(perf_counter() - start)
+    settings["budget"] = budget.less(spent.seconds)
     sturdiest: SturdyPlan | None = None
     if sturdy and (path is None or k is not None or removal.tilt is not None):
         raise InputError("Expected --sturdy with the path of an assembly, and without --k and --tilt.")
-    with progress_bar(f"planning {problem.name}", after=1.0):
+    with progress_bar(f"planning {problem.name}", after=1.0), spent.on("planning"):
         if sturdy:
             sturdiest = sturdiest_plan(
                 lambda tilt: made(family.problem, assembly, options=named | {"tilt": tilt}, whose=family.name),
@@ -153,8 +151,10 @@ def plan(
             results = plans(problem, k=k, rng=np.random.default_rng(search.seed), **settings)
         if not results:
             # The k best of none: ask for one, to be told why there is none.
-            settings["budget"] = budget.less(perf_counter() - start)
+            settings["budget"] = budget.less(spent.seconds)
             results = [solve(problem, rng=np.random.default_rng(search.seed), **settings)]
+    # What a user waits for, reading and geometry included.
+    results = [replace(result, seconds=spent.seconds) for result in results]
     answer = {
         **problem_part(family.name, problem, number, options),
         **source,
@@ -165,6 +165,10 @@ def plan(
         **result_part(results[0]),
         **({"sturdy": sturdiest.as_json()} if sturdiest else {}),
     }
+    if results[0].why_not is not None and assembly is not None:
+        left = None if search.seconds is None else search.seconds - spent.seconds
+        with progress_bar("looking for what would help", after=1.0), spent.on("what would help"):
+            answer["widened"] = widened(family, assembly, named | options, results[0].why_not, settings, left)
     if k is not None:
         answer["plans"] = [result_part(result) for result in results]
     if out is not None:
@@ -172,9 +176,11 @@ def plan(
     if as_json:
         print_json(answer)
     else:
-        _show(problem, results, answer)
+        show(problem, results, answer)
         if sturdiest:
             print(sturdiest.sentence)
+        if results[0].status is Status.OUT_OF_BUDGET and search.seconds is not None:
+            print(f"Spent: {spent}.")
     raise typer.Exit(results[0].status.exit_code)
 
 
@@ -201,64 +207,3 @@ def _problem(family: ProblemFamily, number: int | None, cells: object, options: 
     if make is None:
         raise InputError(f"Expected a domain of polycube puzzles (soma) for --cells; {family.name!r} is none.")
     return made(make, cells, options=options, whose=family.name)
-
-
-def _show(problem: Problem, results: Sequence[PlanResult], answer: dict[str, Any]) -> None:
-    best = results[0]
-    advice = f"with the prior {answer['prior']}" if answer["prior"] else "without a prior"
-    print(f"{problem.name}: {answer['planner']} {advice}, oracle {answer['oracle']}")
-    if best.plan is not None:
-        _show_steps(best.plan, best)
-    print(f"{best.status.sentence}{ENDED[best.side]}")
-    if best.plan is not None and best.fewest is not None:
-        steps = f"{len(best.plan)} step{'' if len(best.plan) == 1 else 's'}"
-        print(f"{steps}; proved fewest." if best.fewest else f"{steps}; not proved fewest.")
-    if best.plan is None:
-        so_far = joined(best.best_prefix) or "nothing"
-        print(f"The longest prefix that works: {so_far} ({len(best.best_prefix)} of {len(problem.actions)}).")
-        if best.best_suffix is not None and best.side != "empty":
-            print(f"From the empty side {len(best.best_suffix)} of {len(problem.actions)} can be undone.")
-    if best.why_not is not None:
-        for sentence in best.why_not.sentences:
-            print(f"  {sentence}")
-    elif best.plan is None:
-        print(f"The last of {best.iterations} refusals:" if best.blame else "Nothing was refused.")
-        for refusal in best.blame[-LAST_REFUSALS:]:
-            print(f"  {_when(refusal)}, not {refusal.action}: {refusal.reason}")
-    counts = {"iteration": best.iterations, "attempt": best.attempts, "expansion": best.expansions}
-    figures = ", ".join(f"{n} {what}{'' if n == 1 else 's'}" for what, n in counts.items())
-    print(f"{figures}, {1000 * best.seconds:.1f} ms")
-    for rank, other in enumerate(results if len(results) > 1 else (), 1):
-        cost = "" if other.cost is None else f"  (cost {other.cost:.3f} nats)"
-        print(f"plan {rank}: {' '.join(other.plan or ())}{cost}")
-
-
-def _when(refusal: Rejection) -> str:
-    """What was done before an attempt that was refused."""
-    done = joined(refusal.after) or "nothing"
-    return f"after {done}" if refusal.side == "full" else f"from the empty side with {done} undone"
-
-
-def _show_steps(steps: Sequence[str], result: PlanResult) -> None:
-    """The plan and the refusals in the order in which they came; those off the plan's path say after what.
-
-    Where few actions are wanted these are left out: most come after the plan, of the search for a shorter one.
-    """
-    motions = [f"  {motion}" if motion else "" for motion in result.motions] or [""] * len(steps)
-    printed = 0
-
-    def advance(to: int) -> int:
-        for i in range(printed, to):
-            print(f"  {i + 1}. {steps[i]}{motions[i]}")
-        return max(printed, to)
-
-    for refusal in result.blame:
-        depth = len(refusal.after)
-        on_path = refusal.side == "full" and tuple(steps[:depth]) == refusal.after
-        if result.fewest is not None and not on_path:
-            continue  # of the search for a shorter plan
-        if on_path:
-            printed = advance(depth)
-        elsewhere = "" if on_path and depth == printed else f" ({_when(refusal)})"
-        print(f"     not {refusal.action}{elsewhere}: {refusal.reason}")
-    advance(len(steps))

@@ -20,7 +20,10 @@ FILM_SIZE, STILL_SIZE = (640, 480), (960, 720)
 
 def render(
     what: Annotated[
-        str, typer.Argument(metavar="PATH|DOMAIN", help="An assembly of yours, or a family; --plan says which problem.")
+        str,
+        typer.Argument(
+            metavar="PATH|DOMAIN", help="A plan.json, an assembly of yours, or a family; --plan says which problem."
+        ),
     ],
     *,
     plan: Annotated[Path | None, typer.Option(metavar="PLAN", help="What `neurosym plan --out` wrote.")] = None,
@@ -50,12 +53,15 @@ def render(
     ] = None,
 ) -> None:
     """Draw a plan as a film, part by part along its path, or the parts pulled apart."""
+    from neurosym.plan_files.reading import is_plan
     from neurosym.simulation.animation import frames
     from neurosym.simulation.exploded import exploded_view
     from neurosym.simulation.film_files import check_film, still, write_film
     from neurosym.simulation.filming import DEFAULT_CAMERA
     from neurosym.simulation.looks import Camera
 
+    if plan is None and is_plan(Path(what)):
+        plan = Path(what)
     if out is None and exploded is None:
         raise InputError("Expected --out FILM, --exploded FILE.png, or both.")
     if out is not None and plan is None:
@@ -76,7 +82,7 @@ def render(
     staging, title = _staging(what, plan, number, files, {"collapse": collapse, **common.family_options(option)})
     if exploded is not None:
         picture = exploded_view(staging, spread=spread, size=still_size, camera=camera, title=title)
-        print(f"{still(picture, exploded)}: {title}, {len(staging.assembly)} parts pulled apart.")
+        print(f"{still(picture, exploded)}: {title}, {len(staging.shown)} parts pulled apart.")
     if out is not None:
         with common.progress_bar("pictures") as progress:
             film = frames(staging, title=title, size=film_size, camera=camera, progress=progress)
@@ -97,7 +103,7 @@ def _staging(
         raise InputError("Expected either --plan, which names its problem, or --problem with its options; got both.")
     saved = read_plan(plan)
     domain = saved.document["domain"]
-    if what != domain and not Path(what).exists():
+    if what not in (domain, str(plan)) and not Path(what).exists():
         raise InputError(f"Expected what {plan} was made for, {domain!r} or the path of its assembly; got {what!r}.")
     return stage(saved.problem, saved.plan, saved.motions), saved.problem.name
 

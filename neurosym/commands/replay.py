@@ -9,7 +9,7 @@ import typer
 
 from neurosym.commands.common import AsJson, console, print_json, write_json
 from neurosym.commands.exit_codes import UNWELL
-from neurosym.support.words import joined
+from neurosym.support.words import joined, listed
 
 if TYPE_CHECKING:
     from neurosym.simulation.replay_report import ReplayReport, StepReplay
@@ -80,7 +80,11 @@ def _show(name: str, report: ReplayReport) -> None:
     console(table).print(table)
     limit = f"{report.threshold:.3g} {report.unit or ''}".strip()
     failed = report.failed_at
-    if failed is None:
+    fell = [number for number, step in enumerate((report.start, *report.steps)) if step.moved]
+    if failed is None and fell:
+        at = listed([str(number) if number else "the start" for number in fell])
+        print(f"No more moved at any of {len(report.steps)} steps than this rule allows: one cube alone, at {at}.")
+    elif failed is None:
         print(f"The rest stood still at all {len(report.steps)} steps: nothing went by {limit}, which counts as moved.")
     elif failed < 0:
         print(f"The assembly does not stand before the first step. {report.start.reason}")

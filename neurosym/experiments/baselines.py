@@ -7,7 +7,6 @@ from collections.abc import Callable, Hashable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from neurosym.experiments.order_accuracy import classes_at, classes_of, seen_in
 from neurosym.language.demonstrations import Demonstrations
@@ -47,6 +46,8 @@ def blind(train: Demonstrations, test: Demonstrations) -> Figures:
     `whole_sequence`: the most frequent sequence of classes; `per_step`: the assignment of actions to steps that is
     right in most; `stop_accuracy`: the most frequent length.
     """
+    from scipy.optimize import linear_sum_assignment
+
     classes = np.array(classes_of(train))
     known, wanted = classes_at(train.sequences, tuple(classes)), classes_at(test.sequences, classes_of(test))
     rows, counts = np.unique(known, axis=0, return_counts=True)

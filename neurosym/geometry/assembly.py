@@ -27,6 +27,8 @@ from neurosym.geometry.shapes import Part
 from neurosym.geometry.tolerances import DEFAULT_TOLERANCES, Tolerances
 from neurosym.support.arrays import Array, Numbers
 from neurosym.support.bitsets import bits
+from neurosym.support.html import table
+from neurosym.support.words import counted, listed
 
 #: The height of a table that is not there: infinitely far down, where nothing touches it.
 NO_TABLE = float("-inf")
@@ -35,7 +37,7 @@ NO_TABLE = float("-inf")
 FRICTION = 0.5
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Assembly:
     """Named parts at poses.
 
@@ -158,6 +160,20 @@ class Assembly:
     def names(self) -> tuple[str, ...]:
         """Names of the parts, in order; masks of parts number their bits so."""
         return tuple(p.name for p in self.parts)
+
+    def __repr__(self) -> str:
+        units = f", {self.units}" if self.units else ""
+        return f"Assembly({counted(len(self), 'part')}: {listed(self.names)}{units})"
+
+    def _repr_html_(self) -> str:
+        low, high = self.part_bounds[:, 0], self.part_bounds[:, 1]
+        sizes = [" x ".join(f"{v:.4g}" for v in size) for size in (high - low).tolist()]
+        facets = [sum(len(body.shape.faces) for body in part.bodies) for part in self.parts]
+        there = ["fixed" if name in self.fixed else "" for name in self.names]
+        rows = zip(self.names, (len(part.bodies) for part in self.parts), facets, sizes, there)
+        head = ("part", "bodies", "facets", f"extents{f' ({self.units})' if self.units else ''}", "")
+        after = " ".join(map(str, self.notes))
+        return table(head, rows, title=f"Assembly of {counted(len(self), 'part')}", after=after)
 
     @cached_property
     def index(self) -> dict[str, int]:

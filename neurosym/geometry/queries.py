@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Iterable
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, TypeVar, TypeVarTuple, cast
 
 from neurosym.errors import InputError, UnknownNameError
@@ -70,6 +70,9 @@ class AssemblyGeometry:
         """The same assembly with nothing known and nothing tabulated."""
         return AssemblyGeometry(self.assembly, tabulate=False, rule=self.rule, tilt=self.tilt)
 
+    def __repr__(self) -> str:
+        return f"AssemblyGeometry({self.assembly!r}, rule={self.rule!r})"
+
     def __len__(self) -> int:
         return len(self.names)
 
@@ -95,9 +98,13 @@ class AssemblyGeometry:
     @cached_property
     def contacts(self) -> tuple[Contact, ...]:
         """Where bodies touch one another and the table: points, normals, areas."""
+        from neurosym.geometry import kept_tables
         from neurosym.geometry.contact.contacts import find_contacts
 
-        return find_contacts(self.assembly, self._surfaces)
+        def find() -> tuple[Contact, ...]:
+            return find_contacts(self.assembly, self._surfaces)
+
+        return kept_tables.contacts(self.assembly, find) if self.tabulate else find()
 
     # -- blocking ---------------------------------------------------------------------------------------------
 
@@ -129,11 +136,14 @@ class AssemblyGeometry:
         return known or self._graph(directions)
 
     def _graph(self, directions: Directions) -> BlockingGraph:
+        from neurosym.geometry import kept_tables
         from neurosym.geometry.blocking.graph import BlockingGraph
 
         vectors = self.directions(directions)
         key = tuple(map(tuple, vectors.tolist()))
-        graph = self._graphs.get(key) or BlockingGraph(self._sweeps, vectors, tabulate=self.tabulate)
+        keep = partial(kept_tables.blocking, self.assembly, vectors)
+        options: dict[str, Any] = {"tabulate": True, "kept": keep} if self.tabulate else {"tabulate": False}
+        graph = self._graphs.get(key) or BlockingGraph(self._sweeps, vectors, **options)
         self._graphs[key] = graph
         if directions is None or isinstance(directions, str):
             self._graphs[directions] = graph

@@ -6,7 +6,6 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from neurosym.support.arrays import Array, Truths
 
@@ -28,6 +27,8 @@ class Interpolation:
         self.way: Array = second[:3, :3] @ centre + second[:3, 3] - self._start
         self.angle = 0.0
         if not np.array_equal(first[:3, :3], second[:3, :3]):
+            from scipy.spatial.transform import Rotation  # half a command's start, and seldom needed
+
             turn = Rotation.from_matrix(first[:3, :3].T @ second[:3, :3]).as_rotvec()
             self.angle = float(np.linalg.norm(turn))
             x, y, z = turn / max(self.angle, 1e-300)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -43,20 +43,26 @@ class Box:
         return _BOX_FACES
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Convex:
     """A convex body. ``vertices``: float64 (n, 3); ``faces``: int64 (m, 3), outward."""
 
     vertices: Array
     faces: Numbers
 
+    def __repr__(self) -> str:
+        return f"Convex({len(self.vertices)} vertices, {len(self.faces)} faces)"
 
-@dataclass(frozen=True, eq=False)
+
+@dataclass(frozen=True, eq=False, repr=False)
 class Mesh:
     """A closed triangle mesh, convex or not. ``vertices``: float64 (n, 3); ``faces``: int64 (m, 3), outward."""
 
     vertices: Array
     faces: Numbers
+
+    def __repr__(self) -> str:
+        return f"Mesh({len(self.vertices)} vertices, {len(self.faces)} faces)"
 
 
 Shape = Box | Convex | Mesh
@@ -67,11 +73,11 @@ class Body:
     """One shape of a part. ``X_PB``: float64 (4, 4), its pose in the part's frame; ``density``: times the part's."""
 
     shape: Shape
-    X_PB: Array
+    X_PB: Array = field(repr=False)
     density: float = 1.0
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Part:
     """A rigid part: bodies that move together. ``X_WP``: float64 (4, 4); ``density``: mass per unit of volume."""
 
@@ -106,6 +112,9 @@ class Part:
             f"Expected bodies {SMALLEST:g} to {LARGEST:g} long, not so far from the origin that coordinates come in "
             f"steps that count; part {self.name!r} has {found}. Use another unit, or move the assembly to the origin."
         )
+
+    def __repr__(self) -> str:
+        return f"Part({self.name!r}, {len(self.bodies)} {'body' if len(self.bodies) == 1 else 'bodies'})"
 
 
 def boxes_part(name: str, centres: Array, size: Array, X_WP: Array | None = None, density: float = 1.0) -> Part:

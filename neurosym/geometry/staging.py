@@ -28,7 +28,7 @@ class Staging:
         assembly: all parts that ever appear, where they rest when assembled.
         present: names of those that are there before the first step.
         plan: names of the actions.
-        motions: one a step, each with its tracks; without parts it moves nothing.
+        motions: one a step, each with its tracks; without parts where a step moves nothing (glue, a tool in the hand).
         colours: part name -> RGB in 0..1, for parts with a colour of their own.
         tops: part name -> what lies on its top, uint8 (H, W, 3), for parts that bear a picture.
         guessed: numbers of the steps whose motion the plan does not say: a free straight line was looked for.
@@ -48,6 +48,12 @@ class Staging:
         for name in (*self.present, *self.colours, *self.tops, *moving):
             if name not in known:
                 raise UnknownNameError("part", name, known)
+
+    @property
+    def shown(self) -> tuple[str, ...]:
+        """Names of the parts that are there at any time, in the assembly's order."""
+        ever = set(self.present).union(*(motion.parts for motion in self.motions))
+        return tuple(name for name in self.assembly.names if name in ever)
 
     def there(self, step: int) -> tuple[str, ...]:
         """Names of the parts in place before step number `step` (from 0), in the assembly's order."""

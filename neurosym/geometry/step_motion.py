@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -36,8 +36,8 @@ class Track:
     """
 
     parts: tuple[str, ...]
-    poses: Array
-    centre: Array
+    poses: Array = field(repr=False)
+    centre: Array = field(repr=False)
 
     def at(self, key: float) -> Array:
         """The pose, float64 (4, 4), at a key number from 0 to k - 1, whole or between two."""
@@ -70,8 +70,8 @@ class StepMotion:
     """How a step moves parts.
 
     Attributes:
-        parts: names of the parts that leave, or arrive, together. Empty in what a predicate says that does not know
-            them: then they follow from the action's effects.
+        parts: names of the parts that leave, or arrive, together. Empty in a step that moves nothing, and in what a
+            predicate says that does not know them: then they follow from the action's effects.
         direction: unit vector of the straight line along which they go; None where there is none.
         tracks: what moves, pose by pose, with as many poses each, those of `parts` first; what else moves makes way.
             They lead out; what arrives takes them from their end. Empty for a straight line of no given length.

@@ -1,13 +1,13 @@
 """Action schemas: what an action needs and what it changes, over typed parameters."""
 
 import string
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from neurosym.errors import DefinitionError
 from neurosym.language.conditions import And, Condition, ObjectsOf, Quantified, When
 from neurosym.language.costs import Cost, checked_cost
-from neurosym.language.terms import Derived, Literal, Variable, as_condition
+from neurosym.language.terms import Derived, Fluent, Literal, Variable, as_condition
 
 #: What may be listed as an effect: a literal, several with ``&``, `forall` of such, or `when`.
 Effect = Condition | When
@@ -176,11 +176,16 @@ def _effect_list(name: str, eff: object) -> Sequence[object]:
     raise DefinitionError(f"In action {name!r}: expected eff to be a list; got {eff!r}.")
 
 
-def moved_parts(effects: Sequence[Literal], names: Sequence[str]) -> tuple[tuple[str, ...], bool]:
+def moved_parts(
+    effects: Sequence[Literal], names: Sequence[str], presence: Collection[Fluent] = ()
+) -> tuple[tuple[str, ...], bool]:
     """Which of some names leave, by effects that only delete atoms of them; else which arrive, by such that only add.
+
+    `presence`: fluents that say which parts are there; the others then say nothing of it. Empty: any may.
 
     Returns the names, and whether they arrive.
     """
-    added, deleted = ({a for e in effects if e.positive is sign for a in e.atom.args} for sign in (True, False))
+    told = [e for e in effects if not presence or e.atom.predicate in presence]
+    added, deleted = ({a for e in told if e.positive is sign for a in e.atom.args} for sign in (True, False))
     leaving = tuple(name for name in names if name in deleted - added)
     return (leaving, False) if leaving else (tuple(name for name in names if name in added - deleted), True)

@@ -1,6 +1,7 @@
 """Domains: fluents and actions, checked at once, with the place of every mistake named."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from functools import cached_property
 from typing import Any
 
 from neurosym.errors import DefinitionError
@@ -44,6 +45,13 @@ class Domain:
     def has_costs(self) -> bool:
         """Whether an action says what it costs."""
         return any(action.cost is not None for action in self.actions)
+
+    @cached_property
+    def presence(self) -> frozenset[Fluent]:
+        """The fluents that say which parts are there: those that its ready-made predicates were made from."""
+        literals = (literal for action in self.actions for literal in action.pre)
+        made = (p.made_by for literal in literals if isinstance(p := literal.atom.predicate, Derived) and p.made_by)
+        return frozenset(a for _, args, options in made for a in (*args, *options.values()) if isinstance(a, Fluent))
 
     def problem(
         self,

@@ -53,6 +53,15 @@ class Fall:
 
 
 @dataclass(frozen=True)
+class Wider:
+    """An option of a problem that would widen what an answer covers: its name, its value, and the flag for both."""
+
+    option: str
+    value: Any
+    flag: str
+
+
+@dataclass(frozen=True)
 class WhyNot:
     """Why nothing can be taken out.
 
@@ -68,6 +77,8 @@ class WhyNot:
         relaxed: whether gravity and precedence were left aside: even so there is no plan. `after` then need not work.
         building: of a search from the empty side, the names of the parts that are there from its beginning; else None.
             Then `after` is what can be put in place at the most, as the end of a plan, and `left` what cannot.
+        scope: a sentence on what the answer covers: which motions, what is held, gravity or not.
+        wider: options that would widen it, the likeliest to help first.
     """
 
     after: tuple[str, ...]
@@ -79,15 +90,31 @@ class WhyNot:
     unproved: tuple[str, ...] = ()
     relaxed: bool = False
     building: tuple[str, ...] | None = None
+    scope: str = ""
+    wider: tuple[Wider, ...] = ()
+
+    @property
+    def stands(self) -> bool:
+        """Whether all stands before anything is done, as far as that was asked."""
+        return all(f.without for f in self.falls)
 
     @property
     def sentences(self) -> tuple[str, ...]:
-        """The same for a person; what is long is cut, with a count."""
+        """The reasons, what they cover, and what would widen that."""
+        flags = f"What would widen it: {', '.join(w.flag for w in self.wider)}." if self.wider else ""
+        return tuple(filter(None, (*self.reasons, self.scope, flags)))
+
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """Why, for a person, the decisive sentence first; what is long is cut, with a count."""
+        lines = [_fall(f) for f in self.falls if not f.without]
         if self.building is not None:
-            return self._of_building(self.building)
+            return (*lines, *self._of_building(self.building))
+        if lines and not self.blocked:
+            return tuple(lines)
         start = f"After {listed(self.after)} nothing" if self.after else "Nothing"
         relaxed = ", even if nothing could fall and any order would do" if self.relaxed else ""
-        lines = [f"{start} can be taken out of {listed(self.left)}{relaxed}."]
+        lines.append(f"{start} can be taken out of {listed(self.left)}{relaxed}.")
         if self.cycle is not None:
             chain = " blocks ".join([self.cycle.parts[0], *self.cycle.parts[:0:-1], self.cycle.parts[0]])
             lines.append(
@@ -104,12 +131,12 @@ class WhyNot:
             ],
             "parts are blocked",
         )
-        lines += _first([_fall(f) for f in self.falls], "parts could go, but others would fall")
+        lines += _first([_fall(f) for f in self.falls if f.without], "parts could go, but others would fall")
         lines += _first([f"{a} may leave only after {b}." for a, b in self.waiting], "parts wait for others")
         if self.unproved:
             lines.append(
-                f"For {listed(self.unproved)} the search for a way ended without one, which proves nothing: "
-                "more directions or a larger budget may find it."
+                f"For {listed(self.unproved)} the search for a way ended at its own limits, which proves nothing; "
+                "more time would not change that."
             )
         return tuple(lines)
 
@@ -119,7 +146,8 @@ class WhyNot:
         lines = [f"{start} only {len(self.after)} of {loose} parts can be put in place one by one{placed}."]
         blocked = list(dict.fromkeys(b.part for b in self.blocked))
         lines += _first([f"{part} has no way in any more." for part in blocked], "parts have no way in")
-        lines += _first([_fall(f, "With") for f in self.falls], "parts could come next, but something would fall")
+        falls = [_fall(f, "With") for f in self.falls if f.without]
+        lines += _first(falls, "parts could come next, but something would fall")
         lines += _first([f"{b} may come only after {a}." for a, b in self.waiting], "parts wait for others")
         return tuple(lines)
 

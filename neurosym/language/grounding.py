@@ -76,8 +76,9 @@ class GroundProblem:
         self.remembered: int = uses.remembered
         #: What each action costs; None where plans are counted in actions.
         self.costs = tuple(i.cost for i in reachable) if problem.domain.has_costs else None
-        constrained = {a for pair in precedence for a in pair}
-        self.classes: tuple[int, ...] = classes_of(problem, self.actions, names, constrained, uses.again)
+        self._all_names, self._again = names, uses.again
+        self._constrained = {a for pair in precedence for a in pair}
+        self._stated_classes = self._classes(problem.interchangeable)
         self._touching: dict[Atom, tuple[int, ...]] = {}
         self._promises: dict[tuple[Atom, ...], tuple[tuple[int, ...], int]] = {}
         for i, instance in enumerate(reachable):
@@ -143,7 +144,9 @@ class GroundProblem:
                 if verdict.motion is not None:
                     motion = verdict.motion if motion is None else motion.joined(verdict.motion)
         if motion is not None:
-            parts, arrive = moved_parts(self.instances[action].eff, getattr(self.world, "names", ()))
+            parts, arrive = moved_parts(
+                self.instances[action].eff, getattr(self.world, "names", ()), self.problem.domain.presence
+            )
             motion = motion.of_parts(parts, arrive=arrive)
         return None, motion
 
@@ -303,3 +306,14 @@ class GroundProblem:
         for atom in atoms:
             mask |= 1 << self._bits[atom]
         return mask
+
+    @cached_property
+    def classes(self) -> tuple[int, ...]:
+        """One integer an action: of the groups that the problem states, else of those that its semantics knows."""
+        if self.problem.interchangeable:
+            return self._stated_classes
+        return self._classes(self.problem.semantics.interchangeable(self.problem))
+
+    def _classes(self, groups: Sequence[Sequence[str]]) -> tuple[int, ...]:
+        names = self._all_names or (all_names(self.problem) if groups else [])
+        return classes_of(self.problem, groups, self.actions, names, self._constrained, self._again)

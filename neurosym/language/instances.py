@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from graphlib import CycleError, TopologicalSorter
 from typing import TYPE_CHECKING
-
-import networkx as nx
 
 from neurosym.errors import DefinitionError, UnknownNameError
 from neurosym.language.conditions import FALSE, TRUE, And, Condition, Equality, Or
@@ -188,15 +187,14 @@ def all_names(problem: Problem) -> list[str]:
 def check_precedence(before: Sequence[tuple[str, str]], names: Iterable[str], place: str) -> None:
     """Refuse precedence over unknown actions, and precedence in a circle (which is named)."""
     known = set(names)
-    graph = nx.DiGraph()
+    predecessors: dict[str, set[str]] = {}
     for i, (a, b) in enumerate(before):
         for action in (a, b):
             if action not in known:
                 raise DefinitionError(f"In {place}, before[{i}]: {UnknownNameError('action', action, known)}")
-        graph.add_edge(a, b)
+        predecessors.setdefault(b, set()).add(a)
     try:
-        cycle = nx.find_cycle(graph)
-    except nx.NetworkXNoCycle:
-        return
-    circle = " before ".join([a for a, _ in cycle] + [cycle[0][0]])
-    raise DefinitionError(f"In {place}: precedence in a circle, so no order can obey it: {circle}.")
+        TopologicalSorter(predecessors).prepare()
+    except CycleError as error:
+        circle = " before ".join(error.args[1])
+        raise DefinitionError(f"In {place}: precedence in a circle, so no order can obey it: {circle}.") from None

@@ -24,10 +24,12 @@ from neurosym.language import formulas
 from neurosym.language.search_problem import Verdict
 from neurosym.language.state import State
 from neurosym.language.terms import Atom, Derived, Fluent, Literal, Type
+from neurosym.language.travel import remade
 from neurosym.support.bitsets import bits
 from neurosym.support.words import listed
 
 
+@remade
 def free(present: Fluent, *, directions: ArrayLike | None = None, table: bool = True, removal: bool = True) -> Derived:
     """``free(p)``: part p can leave by one straight translation, past the parts present and the table.
 
@@ -77,6 +79,7 @@ def free(present: Fluent, *, directions: ArrayLike | None = None, table: bool = 
     return Derived("free", [part], ask, formula=formula)
 
 
+@remade
 def interlocked(present: Fluent, *, directions: ArrayLike | None = None, table: bool = True) -> Derived:
     """``interlocked()``: no single part of those present is free (they may still come apart in groups)."""
     one = free(present, directions=directions, table=table).function
@@ -92,6 +95,7 @@ def interlocked(present: Fluent, *, directions: ArrayLike | None = None, table: 
     return Derived("interlocked", [], ask)
 
 
+@remade
 def supported(present: Fluent, *, removal: bool = True) -> Derived:
     """``supported(p)``: something under part p, a part present or the table, touches it from below."""
     part = _part_type(present)
@@ -118,6 +122,7 @@ def supported(present: Fluent, *, removal: bool = True) -> Derived:
     return Derived("supported", [part], ask, formula=formula)
 
 
+@remade
 def stable_without(present: Fluent, *, removal: bool = True, held: int = 0) -> Derived:
     """``stable_without(p)``: the parts present other than p stand still under gravity, friction included.
 
@@ -140,7 +145,9 @@ def stable_without(present: Fluent, *, removal: bool = True, held: int = 0) -> D
         rest = state.mask(present, world.names) & ~(1 << world.index[p])
         if world.stability.standing(rest, held=world.mask(hands)).stands:
             return Verdict(True, (), f"The others stand without {p}.", motion=motion)
-        return ask(world, state, p) if not hands else _falls(world, world.stability.standing(rest).falling, (p,), held)
+        if not hands:
+            return ask(world, state, p)
+        return _falls(world, world.stability.standing(rest).falling, rest, (p,), held)
 
     def formula(world: AssemblyGeometry, p: str) -> formulas.Stands:
         return formulas.Stands(present, p, held)
@@ -148,6 +155,7 @@ def stable_without(present: Fluent, *, removal: bool = True, held: int = 0) -> D
     return Derived("stable_without", [part], ask, check=check, formula=formula, after=stands_there(present, held))
 
 
+@remade
 def stands_there(present: Fluent, held: int = 0) -> Derived:
     """``stands_there()``: the parts present stand still under gravity, `held` of them held at the most."""
 
@@ -178,7 +186,7 @@ def stands(
     if answer.stands:
         motion = StepMotion(held=world.in_mask(answer.held)) if answer.held else None
         return Verdict(True, (), f"The others stand without {sentence}.", motion=motion)
-    verdict = _falls(world, answer.falling, leaving, held)
+    verdict = _falls(world, answer.falling, rest, leaving, held)
     if present is None or not answer.promises:
         return verdict
     # The motion stays possible while every part that moves in it is there, whatever else has left, and whatever comes
@@ -191,16 +199,20 @@ def stands(
     return replace(verdict, until=named if removal else None, decided_by=decided_by)
 
 
-def _falls(world: AssemblyGeometry, moving: int, leaving: Sequence[str], held: int) -> Verdict:
-    falling = world.in_mask(moving)
-    lost = losses(world, moving, world.mask(leaving))
+def _falls(world: AssemblyGeometry, moving: int, rest: int, leaving: Sequence[str], held: int) -> Verdict:
+    falling, gone = world.in_mask(moving), world.mask(leaving)
+    anyhow = 0 if not leaving else world.stability.standing_when_held(rest | gone, held).falling & moving
+    if moving and anyhow == moving:
+        return Verdict(False, falling, f"{listed(falling)} would fall, with {listed(leaving)} or without.")
+    lost = losses(world, moving & ~anyhow, gone)
     without = f"Without {listed(leaving)}, " if leaving else ""
-    sentence = f"{without}{listed(falling)} would fall"
+    sentence = f"{without}{listed(world.in_mask(moving & ~anyhow))} would fall"
     if held:
         sentence += f", whichever {'part' if held == 1 else f'{held} parts'} one holds"
     if lost:
         sentence += f" ({listed([f'{a} loses {b}' for a, b in lost])})"
-    return Verdict(False, falling, f"{sentence}.")
+    also = f" {listed(world.in_mask(anyhow))} would fall anyhow." if anyhow else ""
+    return Verdict(False, falling, f"{sentence}.{also}")
 
 
 def losses(world: AssemblyGeometry, falling: int, leaving: int) -> tuple[tuple[str, str], ...]:

@@ -22,6 +22,8 @@ from neurosym.language.costs import Value
 from neurosym.language.semantics import Semantics
 from neurosym.language.terms import Atom, Derived, Literal, Type, Variable
 from neurosym.support.arrays import Pixels
+from neurosym.support.html import table
+from neurosym.support.words import counted, listed
 
 if TYPE_CHECKING:
     from neurosym.language.domain import Domain
@@ -217,8 +219,19 @@ class Problem:
             raise InputError(f"Expected pictures as uint8 (V, H, W, 3); got {array.dtype} of shape {array.shape}.")
         return dataclasses.replace(self, pictures=array)
 
+    def __getstate__(self) -> dict[str, Any]:
+        """What travels: the data, without what was grounded or answered."""
+        return {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
+
     def __repr__(self) -> str:
         return f"Problem({self.name!r}, {len(self.type_of)} objects, {len(self.actions)} actions)"
+
+    def _repr_html_(self) -> str:
+        kinds = ((str(kind), len(names), listed(names)) for kind, names in self.objects.items())
+        wanted = listed([str(literal) for literal in self.goal])
+        after = f"{counted(len(self.actions), 'action')}: {listed(self.actions)}.\nGoal: {wanted}."
+        title = f"Problem {self.name} of the domain {self.domain.name}"
+        return table(("type", "objects", ""), kinds, title=title, after=after)
 
 
 def as_names(given: Any, what: str) -> tuple[str, ...]:

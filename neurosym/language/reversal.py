@@ -31,7 +31,7 @@ def effects_once(ground: GroundProblem) -> tuple[int, ...] | None:
     """What each action changes, a bitset each; None where the problem cannot be reversed.
 
     It can where no two actions change the same, all are asked for by the goal, which asks for nothing derived, and
-    none are interchangeable. Nor may an action be done again.
+    none are stated to be interchangeable. Nor may an action be done again.
     """
     if ground.repeating or ground.has_conditional_effects:
         return None
@@ -42,7 +42,7 @@ def effects_once(ground: GroundProblem) -> tuple[int, ...] | None:
             return None
         seen |= change
         final ^= change
-    alone = len(set(ground.classes)) == len(ground.classes)
+    alone = not ground.problem.interchangeable
     return changes if alone and ground.asks_fluents_only and ground.is_goal(final) else None
 
 

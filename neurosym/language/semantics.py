@@ -50,6 +50,10 @@ class Semantics:
         """What planners see: by default the ground symbols, which name the actions, precedence and goal in any case."""
         return problem.symbols
 
+    def interchangeable(self, problem: Problem) -> Sequence[Sequence[str]]:
+        """Groups of names of actions, each two of which may be swapped in all of the problem without changing it."""
+        return ()
+
     def side(self, problem: Problem) -> str:
         """From where it is searched unless somebody says otherwise: see `planning.planner.SIDES`."""
         return "full"

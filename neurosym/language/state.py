@@ -41,7 +41,7 @@ class AtomSet:
         return tuple(o for o in self._objects if Atom(fluent, (o,)) in self.atoms)
 
     def mask(self, fluent: Fluent, names: tuple[str, ...]) -> int:
-        there = {atom.args for atom in self.atoms if atom.predicate is fluent}
+        there = {atom.args for atom in self.atoms if atom.predicate == fluent}
         return sum(1 << i for i, name in enumerate(names) if (name,) in there)
 
 

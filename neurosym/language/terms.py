@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from neurosym.errors import DefinitionError
 from neurosym.language.conditions import Condition, Equality, ObjectsOf
 from neurosym.language.search_problem import Verdict
+from neurosym.language.travel import reduced
 
 if TYPE_CHECKING:
     from neurosym.language.formulas import Formula
@@ -112,10 +113,21 @@ class Predicate:
 class Fluent(Predicate):
     """A fact that actions change: ``present = Fluent("present", part)``, then ``present("a")``, ``~present(p)``."""
 
-    __slots__ = ()
+    __slots__ = ("_hash",)
 
     def __init__(self, name: str, *types: Type) -> None:
         super().__init__(name, types)
+        self._hash = hash((name, types))
+
+    # A copy that came from another process is the same fluent.
+    def __eq__(self, other: object) -> bool:
+        return self is other or (isinstance(other, Fluent) and (self.name, self.types) == (other.name, other.types))
+
+    def __hash__(self) -> int:
+        return self._hash
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Fluent, (self.name, *self.types)
 
 
 class Derived(Predicate):
@@ -135,7 +147,7 @@ class Derived(Predicate):
             lead there.
     """
 
-    __slots__ = ("after", "check", "formula", "function")
+    __slots__ = ("after", "check", "formula", "function", "made_by")
 
     def __init__(
         self,
@@ -152,6 +164,11 @@ class Derived(Predicate):
         self.check = check
         self.formula = formula
         self.after = after
+        #: The call that made it, where that is how it travels: see `neurosym.language.travel`.
+        self.made_by: tuple[Callable[..., Derived], tuple[Any, ...], dict[str, Any]] | None = None
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return reduced(self)
 
 
 def derived(*types: Type) -> Callable[[Callable[..., Verdict]], Derived]:

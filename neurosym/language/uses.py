@@ -40,9 +40,14 @@ class Uses(NamedTuple):
 
 
 def classes_of(
-    problem: Problem, actions: Sequence[str], all_names: Sequence[str], constrained: set[int], again: int
+    problem: Problem,
+    groups: Sequence[Sequence[str]],
+    actions: Sequence[str],
+    all_names: Sequence[str],
+    constrained: set[int],
+    again: int,
 ) -> tuple[int, ...]:
-    """One integer an action, the same for those that the problem says are interchangeable.
+    """One integer an action, the same for those of one of the `groups`, which are interchangeable.
 
     `constrained`: actions that its precedence singles out, which are no longer like the others. `again`: see `Uses`.
     Raises DefinitionError: names of no actions, in two groups, or of actions that may be done again.
@@ -51,7 +56,7 @@ def classes_of(
     index = {name: i for i, name in enumerate(actions)}
     classes = list(range(len(actions)))
     grouped: set[str] = set()
-    for number, group in enumerate(problem.interchangeable):
+    for number, group in enumerate(groups):
         for name in group:
             if name not in all_names:
                 raise DefinitionError(f"{place}[{number}]: {UnknownNameError('action', name, all_names)}")

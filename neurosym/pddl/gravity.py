@@ -64,9 +64,9 @@ def standing_asked(
         return None
     present = next(iter(kinds))[0]
     for instance in instances:
-        gone = [a.args for a in instance.delete if a.predicate is present]
+        gone = [a.args for a in instance.delete if a.predicate == present]
         one = asked[instance.name]
-        if any(a.predicate is present for a in instance.add) or gone != ([(one.without,)] if one else []):
+        if any(a.predicate == present for a in instance.add) or gone != ([(one.without,)] if one else []):
             return None
         if one and one.without in problem.world.fixed:
             return None

@@ -134,6 +134,14 @@ def problem_of(document: Mapping[str, Any], path: str | Path = "plan.json") -> P
     return made
 
 
+def is_plan(path: Path) -> bool:
+    """Whether a file is a plan's: JSON that names a domain and steps. Anything else is left to the loader."""
+    if path.is_dir() or path.suffix.lower() != ".json":
+        return False
+    document = read_document(path)
+    return "domain" in document and "steps" in document
+
+
 def read_document(path: Path) -> dict[str, Any]:
     if not os.path.exists(path):
         raise InputError(f"Expected a plan at {path}; there is no such file. Write one with `neurosym plan ... --out`.")

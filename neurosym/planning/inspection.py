@@ -1,11 +1,12 @@
 """What an assembly is, before any plan: parts, contacts, what is free, what is interlocked and why, if it stands."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from neurosym.errors import InputError
 from neurosym.geometry.contact.contacts import TABLE, areas_between
 from neurosym.geometry.queries import AssemblyGeometry
+from neurosym.geometry.stability.holding import all_falling
 from neurosym.geometry.step_motion import GROUND
 from neurosym.language.explanation import WhyNot
 from neurosym.language.problem import Problem
@@ -98,6 +99,8 @@ def inspect_problem(problem: Problem, *, margin: bool = False) -> Inspection:
         if (directions := graph.free_directions(i, everything))
     }
     why = problem.semantics.refute(problem)
+    # That the whole does not stand interlocks nothing, and is looked at below.
+    why = replace(why, falls=()) if why is not None and why.blocked else None
     held, gravity = problem.details["held"], problem.details["gravity"]
     standing = world.stability.standing_when_held(everything, held)
     stands = standing.stands or not gravity
@@ -115,7 +118,7 @@ def inspect_problem(problem: Problem, *, margin: bool = False) -> Inspection:
         balanced=balanced,
         movements=tuple(m.sentence(world.names) for m in moves),
         margin=_margin(world, everything, standing.held) if margin and gravity else None,
-        falls=() if stands else world.in_mask(standing.falling),
+        falls=() if stands else world.in_mask(all_falling(world.stability.standing, everything, standing.falling)),
         held=world.in_mask(standing.held) if stands else (),
         notes=tuple(map(str, world.assembly.notes)),
         kept=tuple(map(tuple, problem.details["keep"])),

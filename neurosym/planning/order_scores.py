@@ -12,11 +12,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from neurosym.errors import InputError
 from neurosym.support.arrays import Array
 from neurosym.support.deadline import check, portions
+from neurosym.support.html import SHOWN, table
+from neurosym.support.words import counted, listed
 
 #: Least log-probability a score may have (nats). A prior that is sure still leaves every order a finite cost.
 LOG_FLOOR = -30.0
@@ -25,7 +26,7 @@ LOG_FLOOR = -30.0
 AT_A_TIME = 1_000_000
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class OrderScores:
     """A prior's answer: how likely each action is at each step.
 
@@ -64,6 +65,21 @@ class OrderScores:
             if length.shape != (n_steps + 1,) or np.isnan(length).any():
                 raise InputError(f"Expected log_length of shape ({n_steps + 1},) without NaN; got {length.shape}.")
             object.__setattr__(self, "log_length", _normalised(length[None])[0])
+
+    def __repr__(self) -> str:
+        size = f"{counted(self.n_steps, 'step')}, {counted(self.n_actions, 'action')}"
+        return f"OrderScores({size}: {listed(self.names())})"
+
+    def _repr_html_(self) -> str:
+        """Per cent, rows are steps; the darker the likelier."""
+        shown = min(self.n_actions, SHOWN)
+        names = (self.actions or tuple(map(str, range(self.n_actions))))[:shown]
+        rows = [
+            (i, *((f"{p:.0f}", f"background: rgba(0, 114, 178, {0.7 * p / 100:.2f})") for p in row[:shown]))
+            for i, row in enumerate((100 * np.exp(self.log_prob[: SHOWN + 1])).tolist(), 1)
+        ]
+        after = f"Per cent. The likeliest order: {listed(self.names())}."
+        return table(("step", *names), rows, title=repr(self).partition(":")[0] + ")", after=after)
 
     @classmethod
     def uniform(cls, n_steps: int, actions: Sequence[str], classes: Sequence[int] = ()) -> OrderScores:
@@ -118,6 +134,8 @@ class OrderScores:
 
         With an unsure length, the least over the lengths. Equal costs are broken by `rng` (None: a fixed seed).
         """
+        from scipy.optimize import linear_sum_assignment
+
         rng = rng or np.random.default_rng(0)
         costs = self.costs + rng.random(self.costs.shape) * 1e-9
         if self.log_length is None:

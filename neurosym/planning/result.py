@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 from neurosym.errors import ContractError, InputError
 from neurosym.geometry.step_motion import StepMotion
 from neurosym.language.search_problem import Rejection
+from neurosym.planning.result_text import as_html, as_text, figures
+from neurosym.support.words import listed
 
 if TYPE_CHECKING:
     from neurosym.language.explanation import WhyNot
@@ -20,7 +22,7 @@ class Status(Enum):
 
     SOLVED = ("A plan was found.", 0)
     UNSOLVABLE = ("Proved: no order of these actions reaches the goal.", 11)
-    GAVE_UP = ("No plan was found, and none was ruled out; a complete planner may know more.", 12)
+    GAVE_UP = ("No plan was found, and none was ruled out.", 12)
     OUT_OF_BUDGET = ("The budget ended first; the best prefix is kept. Give more, or a better prior.", 23)
 
     def __init__(self, sentence: str, exit_code: int) -> None:
@@ -46,9 +48,11 @@ class Plan(tuple[str, ...]):
         return Plan(self[::-1], [motion and motion.reversed() for motion in self.motions[::-1]])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class PlanResult:
-    """What a search found. `plan` is present exactly when `status` is SOLVED; anything else raises.
+    """What a search found; printed, it reads as the command line's answer.
+
+    `plan` is present exactly when `status` is SOLVED; anything else raises.
 
     Attributes:
         iterations: rejections before the plan (for swap repair, the paper's count of failed rollouts).
@@ -69,6 +73,7 @@ class PlanResult:
             where they met.
         best_suffix: the longest verified end of an order, from the empty side: what can be undone of all that is done.
             None where nothing was searched from there.
+        n_actions: how many action primitives the problem has; None where nobody said.
     """
 
     status: Status
@@ -88,6 +93,7 @@ class PlanResult:
     best_suffix: tuple[str, ...] | None = None
     total_cost: float | None = None
     cheapest: bool | None = None
+    n_actions: int | None = None
 
     def __post_init__(self) -> None:
         if (self.plan is not None) != (self.status is Status.SOLVED):
@@ -98,6 +104,16 @@ class PlanResult:
             if len(self.motions) not in (0, len(self.plan)):
                 raise ContractError(f"Expected one motion a step, {len(self.plan)} in all; got {len(self.motions)}.")
             object.__setattr__(self, "plan", Plan(self.plan, self.motions))
+
+    def __repr__(self) -> str:
+        plan = "" if self.plan is None else f" {listed(self.plan)};"
+        return f"PlanResult({self.status.name},{plan} {figures(self)})"
+
+    def __str__(self) -> str:
+        return as_text(self)
+
+    def _repr_html_(self) -> str:
+        return as_html(self)
 
     @property
     def solved(self) -> bool:
@@ -118,13 +134,15 @@ class OrderCount:
     """In how many orders a goal can be reached.
 
     `orders`: the number; None where the budget ended first. `exact`: whether there are no others; False where something
-    was refused without proof. `states`: how many were looked at. `seconds`: wall-clock time.
+    was refused without proof. `states`: how many were looked at. `seconds`: wall-clock time. `told_apart`:
+    how many there are where interchangeable actions, which `orders` counts once, are told apart.
     """
 
     orders: int | None
     exact: bool
     states: int
     seconds: float
+    told_apart: int | None = None
 
     def as_json(self) -> dict[str, Any]:
         """For a file."""

@@ -35,7 +35,9 @@ def stage(problem: Problem, plan: Sequence[str], motions: Sequence[StepMotion | 
         for action in problem.domain.actions:
             for binding in problem.bindings(action):
                 effects = [e.bind(binding) for e in action.eff]
-                moved[action.ground_name(binding)] = parts, arrive = moved_parts(effects, world.names)
+                moved[action.ground_name(binding)] = parts, arrive = moved_parts(
+                    effects, world.names, problem.domain.presence
+                )
                 if not arrive:
                     lacking = [e.atom for e in effects if not e.positive and e.atom not in problem.init]
                     absent.update(name for name in parts if any(name in atom.args for atom in lacking))
@@ -44,7 +46,7 @@ def stage(problem: Problem, plan: Sequence[str], motions: Sequence[StepMotion | 
         parts, arrive = moved.get(name, ((), False))
         whole.append((motion or StepMotion()).of_parts(parts, arrive=arrive))
         absent |= set(whole[-1].parts) if whole[-1].arrives else set()
-    # A tool that is picked up is no part: such a step shows, and moves nothing.
+    # A step may move nothing; a plan that moves nothing at all has no place in space.
     if geometry is None or (whole and not any(motion.parts for motion in whole)):
         raise InputError(
             f"Expected a problem that says what its actions do to parts in space; {problem.name!r} does not. Give "

@@ -5,10 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
-from neurosym.plotting.style import COLUMN, SMALL, TITLE, add_legend, look_of, tidy
+from neurosym.plotting.style import COLUMN, SMALL, TITLE, Figure, add_legend, look_of, tidy
 from neurosym.support.arrays import Numbers
 
 #: Of an axis with many n only so many are named.

@@ -4,10 +4,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
-from neurosym.plotting.style import COLUMN, SMALL, TITLE, add_legend, look_of, mark, narrow, papers_mark, tidy
+from neurosym.plotting.style import COLUMN, SMALL, TITLE, Figure, add_legend, look_of, mark, narrow, papers_mark, tidy
 from neurosym.support.arrays import Array, Numbers
 
 #: Least width of the Gaussian kernels: a hundred test pictures do not tell shares further apart.

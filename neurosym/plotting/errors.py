@@ -6,9 +6,8 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import PowerNorm
-from matplotlib.figure import Figure
 
-from neurosym.plotting.style import COLUMN, SMALL, TITLE, add_legend, look_of, narrow, tidy
+from neurosym.plotting.style import COLUMN, SMALL, TITLE, Figure, add_legend, look_of, narrow, tidy
 from neurosym.support.arrays import Array, Numbers
 
 Counts = Mapping[str, Numbers]

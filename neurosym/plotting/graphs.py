@@ -7,7 +7,6 @@ from typing import Any
 import networkx as nx
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.patches import FancyBboxPatch, Rectangle
 
 from neurosym.geometry.assembly import Assembly
@@ -19,7 +18,7 @@ from neurosym.geometry.step_motion import GROUND
 from neurosym.plotting.layers import BOX, Layout, box_width, in_inches, in_layers, write_names
 from neurosym.plotting.matrices import blocking_matrices, contact_matrix, depths
 from neurosym.plotting.routes import Point, bends
-from neurosym.plotting.style import COLOURS, COLUMN, SMALL, TITLE
+from neurosym.plotting.style import COLOURS, COLUMN, SMALL, TITLE, Figure
 
 #: More parts than this are drawn as a matrix.
 MOST_NODES = 16

@@ -5,10 +5,21 @@ from pathlib import PurePath
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
-from neurosym.plotting.style import COLOURS, COLUMN, LOOKS, SMALL, TITLE, add_legend, mark, papers_mark, shortened, tidy
+from neurosym.plotting.style import (
+    COLOURS,
+    COLUMN,
+    LOOKS,
+    SMALL,
+    TITLE,
+    Figure,
+    add_legend,
+    mark,
+    papers_mark,
+    shortened,
+    tidy,
+)
 
 #: Counts above this share one bar: the tail of a planner without a prior would squeeze all others.
 LAST_BAR = 12

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 
 import networkx as nx
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
-from neurosym.plotting.style import COLUMN, shortened
+from neurosym.plotting.style import COLUMN, Figure, shortened
 
 #: Letters of names (points), and what one of them takes (inches).
 LETTERS, LETTER_WIDTH = 6.5, 0.058

@@ -3,10 +3,8 @@
 from collections.abc import Mapping, Sequence
 from typing import Protocol
 
-from matplotlib.figure import Figure
-
 from neurosym.errors import InputError
-from neurosym.plotting.style import COLUMN, TITLE, add_legend, look_of, mark, tidy
+from neurosym.plotting.style import COLUMN, TITLE, Figure, add_legend, look_of, mark, tidy
 
 
 class Epoch(Protocol):

@@ -5,12 +5,11 @@ from collections.abc import Mapping, Sequence
 import networkx as nx
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.blocking.graph import BlockingGraph
 from neurosym.geometry.step_motion import GROUND
-from neurosym.plotting.style import COLUMN, SMALL, TITLE, shortened, tidy
+from neurosym.plotting.style import COLUMN, SMALL, TITLE, Figure, shortened, tidy
 from neurosym.support.arrays import Array
 from neurosym.support.bitsets import bits
 

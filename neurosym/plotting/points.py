@@ -5,9 +5,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
-from neurosym.plotting.style import COLUMN, SMALL, TITLE, add_legend, look_of, mark, papers_mark, tidy
+from neurosym.plotting.style import COLUMN, SMALL, TITLE, Figure, add_legend, look_of, mark, papers_mark, tidy
 
 #: Height of a row (inches).
 ROW = 0.19

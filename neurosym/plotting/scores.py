@@ -6,12 +6,22 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import PowerNorm
-from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from neurosym.planning.order_scores import OrderScores
 from neurosym.plotting.errors import write_shares
-from neurosym.plotting.style import COLOURS, COLUMN, SMALL, TITLE, add_legend, mark, shortened, tidy, without_common
+from neurosym.plotting.style import (
+    COLOURS,
+    COLUMN,
+    SMALL,
+    TITLE,
+    Figure,
+    add_legend,
+    mark,
+    shortened,
+    tidy,
+    without_common,
+)
 
 #: With more actions than these no probability is written into its cell, and then no names beside it.
 WRITTEN, MOST_NAMES = 8, 30

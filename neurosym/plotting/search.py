@@ -7,10 +7,20 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from neurosym.planning.result import PlanResult
-from neurosym.plotting.style import COLOURS, COLUMN, TITLE, add_legend, mark, shortened, tidy, width_of, without_common
+from neurosym.plotting.style import (
+    COLOURS,
+    COLUMN,
+    TITLE,
+    Figure,
+    add_legend,
+    mark,
+    shortened,
+    tidy,
+    width_of,
+    without_common,
+)
 
 #: Refusals that are drawn, the first ones; the title says how many there were.
 MOST_REFUSALS = 300

@@ -1,13 +1,14 @@
 """What all figures share: colours, the width of a column, how methods look, and how figures are saved."""
 
+import io
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import matplotlib
+from matplotlib import figure
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure as Figure
 from matplotlib.lines import Line2D
 from matplotlib.textpath import TextPath
 
@@ -19,6 +20,15 @@ COLOURS = ("#7f7f7f", "#E69F00", "#56B4E9", "#D55E00", "#0072B2", "#009E73", "#C
 COLUMN = 3.4
 #: Sizes of letters (points): of titles and names of axes, and of all else.
 TITLE, SMALL = 8, 7
+
+
+class Figure(figure.Figure):
+    """A figure that a notebook shows when it is a cell's value, whatever matplotlib was told before."""
+
+    def _repr_png_(self) -> bytes:
+        content = io.BytesIO()
+        self.savefig(content, format="png", dpi=150)
+        return content.getvalue()
 
 
 class Look(NamedTuple):

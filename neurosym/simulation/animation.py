@@ -64,7 +64,8 @@ def frames(
         report(ends)
         for i, motion in enumerate(staging.motions):
             around, words, note = company(staging, i), describe(staging, i), f"{i + 1}/{count}"
-            colour = colours.get(first_part(staging, i))
+            part = first_part(staging, i)
+            colour = None if part is None else colours[part]
             for k in range(1, moving + 1):
                 shot = film.picture({*around, *motion.parts}, motion.at(_eased(k / moving)), marked=motion.held)
                 yield captioned(shot, words, note=note, colour=colour, progress=(i + k / moving) / count)

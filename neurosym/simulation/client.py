@@ -84,10 +84,8 @@ def pybullet() -> Any:
                 with _without_banner():
                     _module = importlib.import_module("pybullet")
             except ImportError as error:
-                raise MissingDependencyError(
-                    "Expected PyBullet, which simulates and draws; it is not installed. Install it with "
-                    "'pip install pybullet' (wheels up to Python 3.11; later ones compile it with a C++ compiler)."
-                ) from error
+                purpose = "simulates and draws (wheels up to Python 3.11; later ones compile it with a C++ compiler)"
+                raise MissingDependencyError.of("PyBullet", purpose, "physics") from error
         return _module
 
 

@@ -3,24 +3,31 @@
 Joints, frames and whatever else has few inner edges are cut exactly, by binary space partition along their own faces:
 the plane of a face divides the space that is left, and the faces that lie across it; where no face is left, what is
 behind the last one is inside (Fuchs, Kedem and Naylor 1980). Planes that cut no face come first, so a convex mesh
-stays whole and a joint or a frame falls into few pieces. What, like a bowl, would fall into too many pieces goes to
-V-HACD, which PyBullet brings and which approximates: measured on a channel of volume 5, its pieces have 5.9, and the
-hollow is half filled. So a part in a snug or curved hole may be pressed by its neighbours where the real one is not. A
-part that never moves needs none of this: it collides as the mesh it is.
+stays whole and a joint or a frame falls into few pieces. Plates with holes, flanges and bushings fall into prisms,
+exactly too (see `neurosym.simulation.layers`). What, like a bowl, is neither goes to CoACD (Wei et al., "Approximate
+convex decomposition for 3D meshes with collision-aware concavity and tree search", 2022), or without it to V-HACD,
+which PyBullet brings. Both approximate: a part in a snug hole may be pressed by its neighbours where the real one is
+not. A replay looks for that before it begins. A part that never moves collides as the mesh it is.
 """
 
 import os
 import tempfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from neurosym.errors import AssemblyError
 from neurosym.simulation.client import pybullet, without_output
+from neurosym.simulation.layers import layered
+from neurosym.support import disk_cache
 from neurosym.support.arrays import Array, Numbers
 
 #: V-HACD's voxels in a part's bounding box: at 100,000 a cubic part has some 46 along an edge.
 VOXELS = 100_000
+#: How far CoACD's pieces may be from the part (Hausdorff distance, as a share of its extent), and how long it looks.
+CONCAVE = 0.03
+SEARCH: dict[str, Any] = {"mcts_nodes": 10, "mcts_iterations": 40, "mcts_max_depth": 2, "resolution": 1000, "seed": 0}
 #: How hollow a piece may stay, as a share of the part's volume.
 CONCAVITY = 0.001
 
@@ -31,7 +38,26 @@ def convex_pieces(name: str, vertices: Array, faces: Numbers) -> list[Array]:
     `name`: of the part, for messages. `vertices`: float64 (n, 3). `faces`: int64 (m, 3). Raises AssemblyError: neither
     way finds any piece in the mesh.
     """
-    return cut_into_convex(vertices, faces) or _by_vhacd(name, vertices, faces)
+    exact = cut_into_convex(vertices, faces) or layered(vertices, faces)
+    return exact or _by_coacd(vertices, faces) or _by_vhacd(name, vertices, faces)
+
+
+def _by_coacd(vertices: Array, faces: Numbers) -> list[Array] | None:
+    """Approximately; kept on disk, for it takes its time. None: CoACD is not installed, or finds nothing."""
+    place = disk_cache.place("pieces", np.ascontiguousarray(vertices).tobytes(), np.ascontiguousarray(faces).tobytes())
+    kept = disk_cache.load_all(place)
+    if kept is None:
+        try:
+            import coacd
+        except ImportError:
+            return None
+        coacd.set_log_level("error")
+        low, span = vertices.min(axis=0), float(np.ptp(vertices, axis=0).max())
+        mesh = coacd.Mesh((vertices - low) / span, faces)
+        found = [hull * span + low for hull, _ in coacd.run_coacd(mesh, threshold=CONCAVE, **SEARCH)]
+        kept = {str(k): hull for k, hull in enumerate(found)}
+        disk_cache.store_all(place, kept)
+    return list(kept.values()) or None
 
 
 def _by_vhacd(name: str, vertices: Array, faces: Numbers) -> list[Array]:

@@ -16,10 +16,10 @@ from neurosym.support.arrays import Array, Pixels
 
 #: Gap between the bounds of exploded parts, as a share of the median part's extent.
 GAP = 0.35
+#: More parts than this have no numbers: they would cover what they number.
+MOST_NUMBERED = 150
 #: How far parts go without a plan, at a spread of one: so many times their way from the middle.
 RADIAL = 0.9
-#: More parts than this are not named in the picture.
-MOST_NAMES = 60
 
 
 def explode(staging: Staging, *, spread: float = 1.0) -> dict[str, Array]:
@@ -27,18 +27,20 @@ def explode(staging: Staging, *, spread: float = 1.0) -> dict[str, Array]:
 
     With motions, backwards: the part that leaves last stays, and each other one goes along its way out until its
     bounds are clear of all that are placed by then. Parts without a straight way out, and all parts of a staging
-    without motions, go away from the middle. `spread`: how far apart: 1 as described, 0 not at all.
+    without motions, go away from the middle. Parts that are gone before the plan begins are left out. `spread`: how
+    far apart: 1 as described, 0 not at all.
     """
     if not np.isfinite(spread) or spread < 0:
         raise InputError(f"Expected a spread of 0 or more; got {spread!r}.")
-    assembly = staging.assembly
-    bounds = dict(zip(assembly.names, assembly.part_bounds))
+    assembly, shown = staging.assembly, staging.shown
+    bounds = {name: b for name, b in zip(assembly.names, assembly.part_bounds) if name in shown}
     directions = _directions(staging)
     if not directions:
-        middle = assembly.bounds.mean(axis=0)
+        every = np.array(list(bounds.values()))
+        middle = (every[:, 0].min(axis=0) + every[:, 1].max(axis=0)) / 2
         return {name: spread * RADIAL * (b.mean(axis=0) - middle) for name, b in bounds.items()}
     gap = GAP * float(np.median([np.ptp(b, axis=0).mean() for b in bounds.values()]))
-    shifts = {name: np.zeros(3) for name in assembly.names if name not in directions}
+    shifts = {name: np.zeros(3) for name in bounds if name not in directions}
     placed = [bounds[name] for name in shifts]
     # A removal that comes first lies outermost; an arrival that comes last does too.
     order = [m for m in staging.motions if not m.arrives][::-1] + [m for m in staging.motions if m.arrives]
@@ -53,7 +55,7 @@ def explode(staging: Staging, *, spread: float = 1.0) -> dict[str, Array]:
         for name in names:
             shifts[name] = far * way
             placed.append(bounds[name] + far * way)
-    return {name: shifts[name] for name in assembly.names}
+    return {name: shifts[name] for name in bounds}
 
 
 def exploded_view(
@@ -70,7 +72,8 @@ def exploded_view(
     Args:
         size: width and height in pixels, without the words below.
         camera: from which side; None takes `best_camera`.
-        names: whether each part's name is written on it (up to `MOST_NAMES` parts, and unless they bear pictures).
+        names: whether each part's name is written on it (unless they bear pictures), or its number, with
+            a list beside (up to `MOST_NUMBERED` parts).
     """
     shifts = explode(staging, spread=spread)
     bounds = dict(zip(staging.assembly.names, staging.assembly.part_bounds))
@@ -85,9 +88,9 @@ def exploded_view(
         ground=False,
         tops=staging.tops,
     ) as film:
-        picture = film.picture(staging.assembly.names, where)
-        if names and not staging.tops and len(shifts) <= MOST_NAMES:
-            picture = label(picture, film.seen_at(staging.assembly.names, where))
+        picture = film.picture(tuple(shifts), where)
+        if names and not staging.tops and len(shifts) <= MOST_NUMBERED:
+            picture = label(picture, film.seen_at(tuple(shifts), where), tuple(shifts))
     count = len(shifts)
     return captioned(picture, title or "exploded view", note=f"{count} part{'s' if count != 1 else ''}")
 

@@ -18,6 +18,7 @@ from contextlib import ExitStack
 
 import numpy as np
 
+from neurosym.errors import AssemblyError
 from neurosym.geometry.staging import Staging
 from neurosym.geometry.step_motion import StepMotion
 from neurosym.language.problem import Problem
@@ -29,9 +30,12 @@ from neurosym.simulation.replay_report import ReplayReport, StepReplay, in_hand,
 from neurosym.simulation.solids import BodiesKind
 from neurosym.simulation.window import WorldWindow
 from neurosym.simulation.world import World
+from neurosym.support.words import listed
 
 #: A pulled part that ends farther than this from its path's end, in typical bodies, was jammed.
 JAMMED_SHARE = 0.5
+#: Bodies that overlap by more before anything moves, in typical bodies, are not those of the assembly.
+PRESSED_SHARE = 0.01
 
 
 def replay_plan(
@@ -103,6 +107,8 @@ def replay_staging(
         world = stack.enter_context(made)
         shown = stack.enter_context(WorldWindow(world, staging)) if window else None
         run = _Run(world, staging, bodies == "cubes", pulled, threshold, shown)
+        if kind == "parts":
+            _check_rest(world)
         start = run.start()
         steps: list[StepReplay] = []
         for step in range(len(staging.motions)):
@@ -120,6 +126,21 @@ def replay_staging(
             gravity=world.physics.gravity > 0,
             friction=staging.assembly.friction if world.physics.friction is None else world.physics.friction,
         )
+
+
+def _check_rest(world: World) -> None:
+    """Refuse a scene whose bodies overlap before anything moves: it would fly apart, and say nothing of the parts."""
+    depths = {pair: deep for pair, deep in world.pressed().items() if deep > PRESSED_SHARE * world.unit}
+    if not depths:
+        return
+    unit = f" {world.assembly.units}" if world.assembly.units else ""
+    deepest = sorted(depths, key=lambda pair: -depths[pair])
+    pressed = listed([f"{a} and {b} by {depths[a, b]:.3g}{unit}" for a, b in deepest])
+    raise AssemblyError(
+        f"Expected parts that do not overlap in the simulator; there {pressed} do, before anything moves, so it has no "
+        "verdict. Meshes with curved hollows are only approximated there: give such a part as several convex bodies, "
+        "fix it (a fixed part collides as the mesh it is), or mend an overlap that the model has."
+    )
 
 
 class _Run:
@@ -151,7 +172,9 @@ class _Run:
         world, action, motion = self.world, self._staging.plan[number], self._staging.motions[number]
         there = {part for part, _ in world.there}
         if not motion.parts:
-            return in_hand(action, motion, "Nothing of the assembly moves.")
+            before = world.poses()
+            world.settle(watch=self._show)
+            return self._judged(action, motion, before, ())
         if motion.arrives:
             later = self._staging.motions[number + 1 :]
             if any(other.arrives and set(motion.parts) & set(other.parts) for other in later):

@@ -7,7 +7,7 @@ along the principal axes, and the whole scene is scaled until a typical body mea
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -25,6 +25,8 @@ MeshesKind = Literal["refuse", "decompose"]
 CONVEX_FILL = 1 - 1e-3
 #: The same where meshes may be decomposed: facets of a curved face would give hundreds of pieces, for nothing.
 NEARLY_CONVEX_FILL = 0.95
+#: As long as it has no hole, and no hollow deeper than this share of its smallest extent, in which a part could sit.
+SHALLOW = 0.05
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,7 +144,7 @@ def _mesh_solids(
     mesh = trimesh.Trimesh(corners, faces, process=True)
     hull = mesh.convex_hull
     fill = abs(mesh.volume) / hull.volume
-    convex = fill >= (CONVEX_FILL if meshes == "refuse" else NEARLY_CONVEX_FILL)
+    convex = fill >= CONVEX_FILL or (meshes == "decompose" and fill >= NEARLY_CONVEX_FILL and _is_shallow(mesh, hull))
     # Bullet would silently fill the hollows: a bowl would become a disc.
     if not convex and not static and meshes == "refuse":
         raise InputError(
@@ -160,6 +162,16 @@ def _mesh_solids(
     first, *rest = convex_pieces(name, corners, faces)
     massless = (0.0, np.zeros(3), np.zeros((3, 3)))
     return [Solid(X_WB, None, first, volume, centre, inertia), *(Solid(X_WB, None, v, *massless) for v in rest)]
+
+
+def _is_shallow(mesh: Any, hull: Any) -> bool:
+    """Whether a mesh has no hole, and no hollow deeper than `SHALLOW`: then nothing can be in it."""
+    if mesh.euler_number != 2:
+        return False
+    offsets = np.einsum("md,md->m", hull.face_normals, hull.triangles[:, 0])
+    some = np.array_split(mesh.vertices, len(mesh.vertices) // 500 + 1)
+    depth = max(float((offsets - vertices @ hull.face_normals.T).min(axis=1).max()) for vertices in some)
+    return depth <= SHALLOW * float(mesh.extents.min())
 
 
 def _join(name: str, index: int, solids: Sequence[Solid], density: float) -> RigidBody:

@@ -39,10 +39,12 @@ def company(staging: Staging, step: int) -> tuple[str, ...]:
     return tuple(name for name in staging.assembly.names if name in group - coming)
 
 
-def first_part(staging: Staging, step: int) -> str:
-    """The part that a step is about: the one that its action is named after, or the first that moves; "" for none."""
+def first_part(staging: Staging, step: int) -> str | None:
+    """The part that a step is about: the one that its action is named after, or the first that moves; None: none."""
     action, parts = staging.plan[step], staging.motions[step].parts
-    return action if action in parts else next(iter(parts), "")
+    if not parts:
+        return None
+    return action if action in parts else parts[0]
 
 
 def describe(staging: Staging, step: int) -> str:
@@ -51,6 +53,8 @@ def describe(staging: Staging, step: int) -> str:
     if not motion.parts:
         return action
     around, part = set(company(staging, step)), first_part(staging, step)
+    if part is None:
+        return action
     verb = "place" if motion.arrives else "remove"
     others = [name for name in motion.parts if name != part]
     name = part if action in motion.parts else f"{action}: {part}"

@@ -121,6 +121,17 @@ class World(Bodies):
                 far[part] = max(distance, far.get(part, 0.0))
         return far
 
+    def pressed(self) -> dict[tuple[str, str], float]:
+        """Pairs of parts that overlap as they lie now, with how deep, in the assembly's length unit."""
+        part = {number: key[0] for key, number in self.there.items()}
+        depths: dict[tuple[str, str], float] = {}
+        self.p.performCollisionDetection()
+        for contact in self.p.getContactPoints():
+            a, b, deep = part.get(contact[1]), part.get(contact[2]), -float(contact[8]) * self.unit
+            if a is not None and b is not None and a != b and deep > 0:
+                depths[a, b] = max(deep, depths.get((a, b), 0.0))
+        return depths
+
     def overlaps(self, part: str, shift: Array, tolerance: float) -> tuple[str, ...]:
         """The parts that `part` would cut into, deeper than `tolerance`, if it were moved by `shift`.
 

@@ -5,9 +5,12 @@ costs speed, no more.
 """
 
 import contextlib
+import hashlib
 import os
+import zipfile
 import zlib
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +28,45 @@ def cache_folder() -> Path:
     import platformdirs
 
     return Path(platformdirs.user_cache_dir("neurosym"))
+
+
+@cache
+def _code() -> bytes:
+    """A digest of all that makes what is kept of geometry: a version that nobody has to remember to raise."""
+    home = Path(__file__).parent.parent
+    digest = hashlib.sha256(f"{np.__version__}".encode())
+    for file in sorted((*home.glob("geometry/**/*.py"), *home.glob("support/*.py"))):
+        digest.update(file.read_bytes())
+    return digest.digest()
+
+
+def keeps_geometry() -> bool:
+    """Whether what is read and tabulated is kept: unless the environment's ``NEUROSYM_KEEP`` is 0, as in benchmarks."""
+    return os.environ.get("NEUROSYM_KEEP") != "0"
+
+
+def place(what: str, *content: bytes) -> Path:
+    """Where arrays that geometry makes of this content are kept, with this code."""
+    digest = hashlib.sha256(_code())
+    for part in content:
+        digest.update(len(part).to_bytes(8, "little"))
+        digest.update(part)
+    return cache_folder() / what / f"{digest.hexdigest()}.npz"
+
+
+def load_all(path: Path) -> dict[str, NDArray[Any]] | None:
+    """The arrays that `store_all` wrote, by name; None: there are none, or the file is damaged."""
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            return {name: file[name] for name in file.files}
+    except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error):
+        return None
+
+
+def store_all(path: Path, arrays: Mapping[str, NDArray[Any]]) -> None:
+    """Write arrays, whole or not at all."""
+    with contextlib.suppress(OSError), replacing(path) as temporary:
+        np.savez(temporary, **arrays)  # type: ignore[arg-type]
 
 
 def load(path: Path, place: NDArray[Any]) -> bool:

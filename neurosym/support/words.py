@@ -18,6 +18,11 @@ def listed(names: Sequence[str]) -> str:
     return joined(names)
 
 
+def counted(number: int, what: str) -> str:
+    """'1 step', '2,000 steps'."""
+    return f"{number:,} {what}{'' if number == 1 else 's'}"
+
+
 def in_words(direction: Sequence[float]) -> str:
     """A direction of three numbers: ``+z`` along an axis of the world, its three numbers otherwise."""
     for axis, name in enumerate("xyz"):

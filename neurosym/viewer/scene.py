@@ -2,6 +2,7 @@
 
 import itertools
 from collections.abc import Callable, Collection, Mapping
+from typing import Any
 
 import numpy as np
 import viser
@@ -96,7 +97,9 @@ class PlanScene:
             self._add_part(timeline, i, solid)
         low, high = self._to_scene(timeline.bounds())
         self._ground(timeline, low, high)
-        self._look(low, high)
+        boxes = self._to_scene(timeline.boxes())
+        corners = [boxes[:, list(c), range(3)] for c in itertools.product((0, 1), repeat=3)]
+        self._look(np.concatenate(corners))
 
     def _add_part(self, timeline: Timeline, i: int, solid: Solid) -> None:
         """A part's mesh, and under it in the tree its outline, its picture and its name."""
@@ -112,7 +115,10 @@ class PlanScene:
             at = (0.0, 0.0, 0.51 * z)
             scene.add_image(f"/parts/{i}/top", top, 0.98 * x, 0.98 * y, format="png", wxyz=_UPWARD, position=at)
         named = named_at_first(timeline)
-        tag = scene.add_label(f"/parts/{i}/name", name, font_screen_scale=0.9, anchor="center-center", visible=named)
+        # On top of the part, and hidden by what is before it.
+        over: dict[str, Any] = {"position": (0.0, 0.0, vertices[:, 2].max() + 0.01 * SIZE), "depth_test": True}
+        look: dict[str, Any] = {"font_screen_scale": 0.9, "anchor": "bottom-center", "visible": named}
+        tag = scene.add_label(f"/parts/{i}/name", name, **over, **look)
         self.parts.append(node)
         self._names.append(tag)
         on_pick = self._on_pick
@@ -134,9 +140,9 @@ class PlanScene:
             plane_opacity=1.0 if timeline.staging.assembly.has_table else 0.0,
         )
 
-    def _look(self, low: Array, high: Array) -> None:
+    def _look(self, points: Array) -> None:
         """Place the cameras as near as they can be and still see all of the film in a square window."""
-        eye, middle = camera_for(low, high)
+        eye, middle = camera_for(points)
         camera = self.server.initial_camera
         camera.position, camera.look_at, camera.up = tuple(eye), tuple(middle), (0.0, 0.0, 1.0)
         camera.fov = FIELD_OF_VIEW
@@ -177,7 +183,10 @@ class PlanScene:
             self._path.remove()
             self._path = None
         if step is not None:
-            path = self._to_scene(timeline.path_of(step))
+            path = timeline.path_of(step)
+            if not len(path):
+                return  # it moves nothing
+            path = self._to_scene(path)
             pieces = np.stack([path[:-1], path[1:]], axis=1)
             self._path = self.server.scene.add_line_segments("/parts/way", pieces, _PICKED, thickness=0.008 * SIZE)
 
@@ -243,15 +252,19 @@ def light(scene: viser.SceneApi) -> None:
     scene.add_light_directional("/lights/sun", intensity=SUN, cast_shadow=True, position=(x, y, z))
 
 
-def camera_for(low: Array, high: Array) -> tuple[Array, Array]:
-    """Where a camera stands and what it looks at, float64 (3,) each: as near as it can be and still see all of a box.
+def camera_for(points: Array) -> tuple[Array, Array]:
+    """Where a camera stands and what it looks at, float64 (3,) each: as near as it can be and still see all points.
 
-    The box is in the scene, float64 (3,) each corner, and all seen in a square window.
+    The points, float64 (n, 3), are in the scene, and all seen in a square window.
     """
-    middle, back = (low + high) / 2, FROM / np.linalg.norm(FROM)
+    back = FROM / np.linalg.norm(FROM)
     right = np.cross([0.0, 0.0, 1.0], back)
     right /= np.linalg.norm(right)
     axes = np.stack([right, np.cross(back, right), back], axis=1)
-    corners = (np.array(list(itertools.product(*zip(low, high)))) - middle) @ axes
-    away = corners[:, 2] + np.abs(corners[:, :2]).max(axis=1) * MARGIN / np.tan(FIELD_OF_VIEW / 2)
-    return middle + float(away.max()) * back, middle
+    seen, slope = points @ axes, np.tan(FIELD_OF_VIEW / 2) / MARGIN
+    # From (x, y, z) a point is in sight where |x - px| and |y - py| are at most (z - pz) * slope.
+    most = (seen[:, :2] + seen[:, 2:] * slope).max(axis=0)
+    least = (seen[:, :2] - seen[:, 2:] * slope).min(axis=0)
+    away = float((most - least).max()) / (2 * slope)
+    middle = np.array([*(most + least) / 2, seen[:, 2].mean()])
+    return axes @ np.array([*middle[:2], away]), axes @ middle

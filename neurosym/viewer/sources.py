@@ -9,7 +9,7 @@ from typing import Any
 from neurosym.errors import InputError, UnknownNameError
 from neurosym.geometry.readers.references import Reading
 from neurosym.language.problem import Problem
-from neurosym.plan_files.reading import SavedPlan, problem_of, read_document, read_search
+from neurosym.plan_files.reading import SavedPlan, is_plan, problem_of, read_search
 from neurosym.registry import domain_names, load_domain
 from neurosym.viewer.exhibit import Maker, Query
 from neurosym.viewer.planning import problem_maker
@@ -44,7 +44,7 @@ def open_source(query: Query, cells: Mapping[str, Any] | None = None, reading: R
     """
     path, reading = Path(query.domain), reading or Reading()
     if path.exists() and query.number is None and cells is None:
-        if not _is_plan(path):
+        if not is_plan(path):
             return _assembly_at(path, query, reading)
         reading.refuse("a plan's file says how its assembly is read")
         return _plan_at(path, query)
@@ -72,14 +72,6 @@ def _puzzle(query: Query, cells: Mapping[str, Any]) -> Source:
     given: dict[str, Maker] = {PUZZLE: partial(make, cells)}
     query = replace(query, domain=PUZZLE)
     return Source(query, problem_maker(query, given)(), given)
-
-
-def _is_plan(path: Path) -> bool:
-    """Whether a file is a plan's: JSON that names a domain and steps. Anything else is left to the loader."""
-    if path.is_dir() or path.suffix.lower() != ".json":
-        return False
-    document = read_document(path)
-    return "domain" in document and "steps" in document
 
 
 def _plan_at(path: Path, query: Query) -> Source:

@@ -31,7 +31,7 @@ def caption(exhibit: Exhibit, t: float) -> str:
         text = name if exhibit.search.solved else f"{name}: no plan. The tab Plan says why, as far as it is known."
     elif now is not None:
         action, motion = timeline.staging.plan[now], timeline.staging.motions[now]
-        moves = f"{_who(action, motion)} {_verb(motion)} {escape(motion.course)}"
+        moves = f"{_who(action, motion)} {_verb(motion)} {escape(motion.course)}" if motion.parts else escape(action)
         held = _held(motion, f"<span style='{_HELD}'>{escape(some(motion.held))}</span>")
         text = f"Step {now + 1} of {total}: {moves}{escape(_making_way(motion))}{held}"
     elif t <= 0:

@@ -52,7 +52,8 @@ class Timeline:
         self.bounds_at_rest = staging.assembly.part_bounds
         self.centres = np.asarray(self.bounds_at_rest.mean(axis=1))
         self.n_steps = len(staging.motions)
-        self.backwards = bool(staging.motions) and all(m.arrives for m in staging.motions)
+        moving = [m for m in staging.motions if m.parts]
+        self.backwards = bool(moving) and all(m.arrives for m in moving)
         # From here on, times and steps are those of the film as it is made, where `_played` has turned them.
         present, self._motions = staging.present, staging.motions
         if self.backwards:
@@ -118,18 +119,26 @@ class Timeline:
 
     def bounds(self) -> Array:
         """float64 (2, 3): bounds of what is to be seen at whole times, and at the outer ends of all paths."""
+        boxes = self.boxes()
+        return np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
+
+    def boxes(self) -> Array:
+        """float64 (k, 2, 3): bounds of each part wherever it is to be seen at those times."""
         boxes = self.bounds_at_rest[None] + self.shifts[:, :, None]
         seen = [boxes[self.where != ABSENT] if self.where.any() else self.bounds_at_rest]
         for number, (motion, movers) in enumerate(zip(self._motions, self._movers)):
+            if not motion.tracks:
+                continue
             middle, end = self._middle(number), motion.tracks[0].poses[-1]
             shift = end[:3, :3] @ middle + end[:3, 3] - middle
             seen.append(self.bounds_at_rest[movers] + self._base(number) + shift)
-        all_seen = np.concatenate(seen)
-        return np.stack([all_seen[:, 0].min(axis=0), all_seen[:, 1].max(axis=0)])
+        return np.concatenate(seen)
 
     def path_of(self, step: int) -> Array:
         """float64 (k, 3): the path of the middle of what moves in a step, out from where it rests."""
         number = int(self._played(step + 0.5))
+        if not self._motions[number].tracks:
+            return np.zeros((0, 3))
         path, middle = self._motions[number].tracks[0].poses, self._middle(number)
         return np.asarray(path[:, :3, :3] @ middle + path[:, :3, 3] + self._base(number))
 
@@ -154,6 +163,8 @@ class Timeline:
     def _under_way(self, number: int, share: float) -> dict[str, Array]:
         """Name -> float64 (4, 4): the motions of the parts that move, when `share` of a step's time has passed."""
         motion = self._motions[number]
+        if not motion.tracks:
+            return {}
         share = 1.0 - share if motion.arrives else share
         base = shifted(self._base(number))
         if share <= ON_PATH:
@@ -191,6 +202,11 @@ def _rows_before(assembly: Assembly, groups: Sequence[Numbers], backwards: bool)
 
     The groups, numbers of parts, are in the order of the rows, or `backwards` against it.
     """
+    moving = np.array([len(group) > 0 for group in groups], dtype=bool)
+    if not moving.all():
+        places = np.zeros((len(groups), 3))
+        places[moving] = _rows_before(assembly, [group for group in groups if len(group)], backwards)
+        return places
     shifts = np.zeros((len(groups), 3))
     if not len(groups):
         return shifts

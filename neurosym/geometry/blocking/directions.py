@@ -7,9 +7,6 @@ from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from neurosym.errors import InputError
 from neurosym.geometry.assembly import Assembly
@@ -146,6 +143,10 @@ def _distinct(vectors: Array) -> Array:
 
 def _counted(vectors: Array) -> tuple[Array, Numbers]:
     """Distinct unit vectors, in order of first appearance, and how often each comes."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
+
     count = len(vectors)
     if not count:
         return vectors.reshape(0, 3), np.zeros(0, dtype=np.int64)

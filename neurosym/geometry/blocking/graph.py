@@ -7,9 +7,10 @@ and body by body; every later question about a subset of the parts is bit arithm
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from functools import cached_property
+from typing import TYPE_CHECKING
 
-import networkx as nx
 import numpy as np
 
 from neurosym.geometry.blocking.stepping import hits_along
@@ -21,6 +22,16 @@ from neurosym.support.deadline import check
 from neurosym.support.progress import tell
 from neurosym.support.words import in_words
 
+if TYPE_CHECKING:
+    import networkx as nx
+
+#: Gives what a function finds, or found before.
+Keep = Callable[[Callable[[], Sequence[Hits]]], Sequence[Hits]]
+
+
+def _anew(find: Callable[[], Sequence[Hits]]) -> Sequence[Hits]:
+    return find()
+
 
 class BlockingGraph:
     """Blocking of an assembly in k directions.
@@ -29,13 +40,15 @@ class BlockingGraph:
         sweeps: of the assembly.
         directions: float64 (k, 3), unit vectors.
         tabulate: whether all pairs are asked at once. Otherwise each question is asked anew (`hits_along`).
+        kept: given what finds the hits along all directions, gives them, from disk for instance.
 
     Attributes:
         directions, vectors: the directions, as an array and as tuples.
         into_table: bool (k,): whether a motion along the direction would run into the table.
     """
 
-    def __init__(self, sweeps: Sweeps, directions: Array, *, tabulate: bool = True) -> None:
+    def __init__(self, sweeps: Sweeps, directions: Array, *, tabulate: bool = True, kept: Keep = _anew) -> None:
+        self._kept = kept
         self.sweeps, self.assembly, self.names = sweeps, sweeps.assembly, sweeps.assembly.names
         self.directions = directions
         self.vectors: list[Vector] = [(x, y, z) for x, y, z in directions.tolist()]
@@ -43,7 +56,10 @@ class BlockingGraph:
         self._table = self.by_part if tabulate else None
 
     @cached_property
-    def _hits(self) -> list[Hits]:
+    def _hits(self) -> Sequence[Hits]:
+        return self._kept(self._found)
+
+    def _found(self) -> list[Hits]:
         along: list[Hits] = []
         for d, direction in enumerate(self.directions):
             check()
@@ -142,6 +158,8 @@ class BlockingGraph:
         """
         if table and self.into_table[direction]:
             return []
+        import networkx as nx  # not at the top: many commands draw no graph
+
         index = self.assembly.index
         groups = nx.strongly_connected_components(self.graph(direction, among))
         masks = [sum(1 << index[name] for name in group) for group in groups]
@@ -161,6 +179,8 @@ class BlockingGraph:
         A part without outgoing edges is free in this direction; the parts of a strongly connected component
         can leave only together.
         """
+        import networkx as nx
+
         among = (1 << len(self.names)) - 1 if among is None else among
         graph = nx.DiGraph(direction=tuple(map(float, self.directions[direction])))
         for i in bits(among):

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import ConvexHull
 
 from neurosym.geometry.assembly import Assembly
 from neurosym.geometry.contact.surfaces import FACETS, BodySurfaces, Surfaces
@@ -15,7 +14,8 @@ from neurosym.support.compiled import compiled
 from neurosym.support.deadline import check, portions
 
 #: Share of the smallest extent that counts as an overlap at rest, however coarse `touch` is: along an oblique joint a
-#: layer thinner than `touch` may yet be deeper and wider than it.
+#: layer thinner than `touch` may yet be deeper and wider than it. Half of `touch` where that is less: no overlap is too
+#: much for touch and too little for this.
 OVERLAP = 1e-3
 
 
@@ -50,7 +50,7 @@ class MatingOverlaps:
 
 def mating_overlaps(assembly: Assembly, surfaces: BodySurfaces) -> MatingOverlaps:
     """The facet of either hull that is overlapped least shows the shortest way apart (up to edges against edges)."""
-    bounds, half = assembly.body_bounds, min(assembly.touch, OVERLAP * assembly.smallest_extent) / 2
+    bounds, half = assembly.body_bounds, min(assembly.touch / 2, OVERLAP * assembly.smallest_extent) / 2
     near = overlapping_pairs(bounds[:, 0] + half, bounds[:, 1] - half, assembly.owners)
     if not len(near):
         return MatingOverlaps(near, np.zeros((0, 3)), len(assembly.bodies))
@@ -74,6 +74,8 @@ def _hull(assembly: Assembly, surfaces: Surfaces, body: int) -> tuple[Array, Arr
     """Planes of the facets of a body's convex hull, float64 (m, 4): n . x + w <= 0 inside; and its corners, (k, 3)."""
     vertices = surfaces.vertices[surfaces.first_vertex[body] : surfaces.first_vertex[body + 1]]
     if not assembly.bodies.is_convex[body]:
+        from scipy.spatial import ConvexHull
+
         hull = ConvexHull(vertices)
         return hull.equations, vertices[hull.vertices]
     own = slice(surfaces.first[body], surfaces.first[body + 1])

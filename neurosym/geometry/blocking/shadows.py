@@ -2,8 +2,8 @@
 
 Only faces of what moves that look back matter, and faces of what stands that look along the direction: walls parallel
 to it fall out. Where two of them lie over one another, the depth of the overlap is a linear function. It is measured
-across the flatter of the two: faces that mate obliquely, and overlap by a little, block no more than those that mate
-squarely.
+across the two, as the ball that fits between them: faces that mate obliquely, or end at an edge, and overlap by a
+little, block no more than those that mate squarely.
 """
 
 from __future__ import annotations

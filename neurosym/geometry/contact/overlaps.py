@@ -5,7 +5,7 @@ how deep a corner of one lies in the other. Where faces mate it is the thickness
 smaller motion than this depth can part the two bodies (each point of the ball, or the corner, has to come out), and
 two bodies that only touch have depth 0, convex or not. Between the surfaces balls are looked for at the middle of each
 patch where two faces look at one another the wrong way round, so that the depth is exact for flat mating faces and
-never too large for others.
+never too large for others; where a body is not convex, balls then grow into corners, in which a layer has more room.
 """
 
 from __future__ import annotations
@@ -35,6 +35,11 @@ NOISE = 1e-6
 #: For one pair of bodies, evenly spread ones where there are more: points asked whether they lie inside, and points
 #: measured that do; places where edges go through faces that are joined two by two.
 MAX_ASKED, MAX_MEASURED, MAX_PLACES = 4_000, 256, 40
+
+#: Balls of one pair that grow, and those that grow to the end; moves that are tried, within a ball of radius 1.
+GROWING, LARGEST = 64, 4
+MOVES = np.random.default_rng(0).normal(size=(32, 3))
+MOVES *= (np.linspace(0.1, 1, 32) / np.linalg.norm(MOVES, axis=1))[:, None]
 
 #: Bodies with more pairs of faces than this are searched for overlaps up to `FAR` of the smallest extent only; deeper
 #: ones show by points that far under their faces.
@@ -135,9 +140,36 @@ class _Pairs:
             points, pair = points[inside], pair[inside]
         kept = _spread(pair, MAX_MEASURED)
         points, pair = points[kept], pair[kept]
-        away = np.min([nearest(points, self.pairs[pair, n], s.triangles, *s.trees, s.first) for n in (0, 1)], axis=0)
+        away = self._away(points, pair)
         np.maximum.at(depth, pair, np.where(away > self.noise / 2, 2 * away, 0.0))
+        np.maximum.at(depth, *self._grown(points, pair, away, depth))
         return depth
+
+    def _away(self, points: Array, pair: Numbers) -> Array:
+        """How far points (n, 3) are from the surfaces of both bodies of a pair (n,): float64 (n,)."""
+        s = self.exact
+        one, other = (nearest(points, self.pairs[pair, n], s.triangles, *s.trees, s.first) for n in (0, 1))
+        return np.asarray(np.minimum(one, other))
+
+    def _grown(self, points: Array, pair: Numbers, away: Array, depth: Array) -> tuple[Numbers, Array]:
+        """Pairs, and how wide balls about points grow: each moves within itself, so that it never leaves a body."""
+        bodies = self.surfaces.bodies
+        hollow = ~bodies.is_convex[self.pairs].all(axis=1) & (depth <= FAR * bodies.smallest_extent)
+        wide = np.flatnonzero(hollow[pair] & (away > 0.4 * depth[pair]) & (away > self.noise / 2))
+        wide = wide[_spread(pair[wide], GROWING)]
+        points, pair, away = points[wide], pair[wide], away[wide]
+        for round, share in enumerate((0.8, 0.8, 0.4, 0.2, 0.1)):
+            moves = np.concatenate([np.zeros((1, 3)), MOVES[:: 1 if round else 4]])
+            tried = points[:, None] + share * away[:, None, None] * moves
+            room = self._away(tried.reshape(-1, 3), np.repeat(pair, len(moves))).reshape(-1, len(moves))
+            best = room.argmax(axis=1)
+            rows = np.arange(len(points))
+            points, away = tried[rows, best], room[rows, best]
+            if not round:
+                order = np.lexsort((-away, pair))
+                order = order[spans(np.unique(pair, return_counts=True)[1])[1] < LARGEST]
+                points, pair, away = points[order], pair[order], away[order]
+        return pair, 2 * away
 
     def _in_other(self, points: Array, first: Numbers, asked: Truths | None = None) -> tuple[Array, Numbers, Numbers]:
         """Points of either body, body b's from first[b] on, that lie within the other: points, pair, other body."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
 
 from neurosym.geometry.mesh.triangles import plane_axes
 from neurosym.support.arrays import Array
@@ -13,6 +12,8 @@ def hull_points(points: Array, normal: Array) -> Array:
     """Corners, in order, of the convex hull of coplanar points (n, 3); empty when they span no area."""
     if len(points) < 3:
         return points[:0]
+    from scipy.spatial import ConvexHull, QhullError
+
     u, v = plane_axes(normal)
     flat = np.stack([points @ u, points @ v], axis=1)
     try:

@@ -11,9 +11,6 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from neurosym.geometry.mesh.broad_phase import overlapping_pairs
 from neurosym.geometry.mesh.connections import planar_regions
@@ -95,6 +92,10 @@ class Flats:
 
     def planes(self, within: float) -> Numbers:
         """int64 (n + 1,): faces in one plane, to `within` (length), bear one number; -1 at the end is of no face."""
+        from scipy.sparse import coo_array
+        from scipy.sparse.csgraph import connected_components
+        from scipy.spatial import cKDTree
+
         count = len(self.body)
         offsets = np.einsum("nd,nd->n", self.normals, self.middles) / within
         planes = np.column_stack([1e6 * self.normals, offsets])

@@ -181,8 +181,8 @@ def blocked(
     Args:
         triangles: heights in the third column.
         low, high, low_b, high_b: of the trees of faces that look down, and of those that look up.
-        touch: the region where the second reaches above the first, deeper than this across one of the two faces, has
-            to be wider than this.
+        touch: the region where the second reaches above the first, deeper than this across the two faces, has to be
+            wider than this.
         most: so many narrow pieces of the region are gathered for a pair.
 
     Returns:
@@ -202,7 +202,8 @@ def blocked(
                 continue
             ax, ay = slope(triangles[i])
             bx, by = slope(triangles[j])
-            scale = 1 / np.sqrt(1 + min(ax * ax + ay * ay, bx * bx + by * by))
+            # Across the two faces: the ball between them over a point is as wide.
+            scale = 2 / (np.sqrt(1 + ax * ax + ay * ay) + np.sqrt(1 + bx * bx + by * by))
             s, t = triangles[i, 0], triangles[j, 0]
             c = t[2] + shift[2] - bx * (t[0] + shift[0]) - by * (t[1] + shift[1]) - s[2] + ax * s[0] + ay * s[1]
             n = keep(one, n, two, c - touch / scale, bx - ax, by - ay)

@@ -5,9 +5,6 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from neurosym.geometry.mesh.connections import adjacent, alike, connected, opposite
 from neurosym.support.arrays import Array, Numbers, Truths
@@ -31,6 +28,8 @@ def merged(vertices: Array, faces: Numbers, within: float = 0.0) -> tuple[Array,
     groups, first = alike(vertices)
     vertices, faces = vertices[first], groups[faces]
     if within > 0:
+        from scipy.spatial import cKDTree
+
         pairs = cKDTree(vertices).query_pairs(within, output_type="ndarray")
         if len(pairs):
             labels = _components(pairs, len(vertices))
@@ -57,6 +56,9 @@ def without_repeats(faces: Numbers, *, cancel: bool = True) -> Numbers:
 
 
 def _components(pairs: Numbers, count: int) -> Numbers:
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
     graph = coo_matrix((np.ones(len(pairs), dtype=np.int8), (pairs[:, 0], pairs[:, 1])), (count, count))
     return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
 
@@ -146,6 +148,8 @@ def closes_at_junctions(vertices: Array, faces: Numbers, within: float) -> bool:
     if not 0 < len(half) <= MAX_OPEN_EDGES:
         return False
     corners = np.unique(half)
+    from scipy.spatial import cKDTree
+
     tree = cKDTree(vertices[corners])
     pieces = []
     for start, end in half:

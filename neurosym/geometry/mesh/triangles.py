@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
 
 from neurosym.geometry.mesh import distances as points_and_trees
 from neurosym.geometry.mesh import kernels, trees
@@ -41,6 +40,8 @@ def are_convex(vertices: Array, faces: Numbers, margin: float) -> bool:
     faces = alike(vertices)[0][faces]
     if has_valley(vertices, faces, adjacent(faces), margin):
         return False
+    from scipy.spatial import ConvexHull, QhullError
+
     try:
         hull = ConvexHull(corners)
     except QhullError:

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from neurosym.errors import MissingDependencyError
 from neurosym.support.arrays import Array
 
 
@@ -26,6 +27,15 @@ class Growth:
     spent: Callable[[], bool]
 
 
+def _ompl() -> tuple[Any, Any, Any]:
+    """OMPL's modules; `MissingDependencyError` where it is not installed."""
+    try:
+        from ompl import base, geometric, util
+    except ModuleNotFoundError as error:
+        raise MissingDependencyError.of("OMPL", "looks for paths that are no straight line", "paths") from error
+    return base, geometric, util
+
+
 def connected(
     low: Array, high: Array, start: Array, goals: Sequence[Array], is_free: Callable[[Array], bool], growth: Growth
 ) -> list[Array] | None:
@@ -33,7 +43,7 @@ def connected(
 
     Of several goals those that are not free are left out.
     """
-    from ompl import base, geometric
+    base, geometric, _ = _ompl()
 
     def point(state: Any) -> Array:
         return np.array([state[k] for k in range(len(low))])
@@ -67,9 +77,9 @@ def grown_out(
 
     Their translations lie within bounds (3,).
     """
-    from ompl import base, geometric
+    base, geometric, _ = _ompl()
 
-    class Out(base.GoalRegion):  # type: ignore[misc]
+    class Out(base.GoalRegion):  # type: ignore[misc,name-defined]
         def distanceGoal(self, state: Any) -> float:
             return left(_pose(state))
 
@@ -86,7 +96,7 @@ def grown_out(
 
 
 def _setup(space: Any, low: Array, high: Array, is_free: Callable[[Any], bool], growth: Growth) -> Any:
-    from ompl import base, geometric, util
+    base, geometric, util = _ompl()
 
     # OMPL logs to stdout, which belongs to the program that calls us.
     util.setLogLevel(util.LogLevel.LOG_NONE)
@@ -105,7 +115,7 @@ def _setup(space: Any, low: Array, high: Array, is_free: Callable[[Any], bool], 
 
 def _solved(setup: Any, planner: Callable[[Any], Any], growth: Growth) -> list[Any]:
     """States of an exact solution; none where there is none."""
-    from ompl import base
+    base, _, _ = _ompl()
 
     grower = planner(setup.getSpaceInformation())
     grower.setRange(growth.step)

@@ -49,6 +49,7 @@ class Contents:
     Attributes:
         parts: meshes still to be looked at, and parts that are ready.
         units, fixed, table, friction, tolerances: as in `Assembly`; None where the file says nothing.
+        touching_gaps: whether faces that lie near one another are taken as touching.
         notes: what was odd but harmless.
         separate: whether solids of one mesh are parts of their own.
         keep, piece_groups, subassemblies: as in `Assembly`; sub-assemblies besides those that meshes lie in.
@@ -61,6 +62,7 @@ class Contents:
     table: float | None = None
     friction: float | None = None
     tolerances: Tolerances | None = None
+    touching_gaps: bool = False
     notes: tuple[Note, ...] = ()
     separate: bool = False
     hint: str = ""

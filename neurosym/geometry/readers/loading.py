@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -20,8 +21,10 @@ from neurosym.geometry.contact.surfaces import BodySurfaces
 from neurosym.geometry.keeping import keep_together
 from neurosym.geometry.mesh import triangles
 from neurosym.geometry.notes import FaultyPartsError, Note
+from neurosym.geometry.readers import kept
 from neurosym.geometry.readers.assembly_json import read_json
 from neurosym.geometry.readers.burrtools import read_xmpuzzle
+from neurosym.geometry.readers.clearances import with_clearances
 from neurosym.geometry.readers.contents import Contents, RawMesh, subassemblies
 from neurosym.geometry.readers.conversion import in_units, upright
 from neurosym.geometry.readers.folder import MESHES, read_folder, read_mesh
@@ -42,6 +45,9 @@ from neurosym.geometry.tolerances import DEFAULT_TOLERANCES, Tolerances
 from neurosym.geometry.units import unit
 from neurosym.support.deadline import check
 from neurosym.support.progress import Progress, silent
+
+#: Seconds that reading must take for what was read to be kept.
+SLOW = 0.2
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,6 +87,7 @@ def load(
     units: str | None = None,
     fixed: Iterable[str] = (),
     tolerances: Tolerances | None = None,
+    touching_gaps: bool = False,
     friction: float | None = None,
     up: str | None = None,
     problem: int = 1,
@@ -100,6 +107,8 @@ def load(
         fixed: names of parts that never move, besides those that the files name.
         tolerances: kept as they are where given. Otherwise touch is raised so that mating faces that overlap at rest,
             by no more than `tolerances.mate`, count as touching; `notes` says by how much.
+        touching_gaps: whether parts drawn with play, whose faces lie near one another without touching, are taken as
+            touching (`neurosym.geometry.readers.clearances`); else `notes` says what touch that takes.
         friction: Coulomb's coefficient; None: the file's, else 0.5.
         up: "y" or "z", what is up in the files; None: z, but in glTF see `neurosym.geometry.readers.gltf`.
         problem, solution: which of a puzzle file's, counted from 1.
@@ -119,6 +128,10 @@ def load(
     source, options = Path(path), Options(up=up, problem=problem, solution=solution, meshes=meshes, joints=joints)
     if options.up not in (None, "y", "z"):
         raise InputError(f'Expected up as "y", "z" or None; got {options.up!r}.')
+    fixed, start = tuple(fixed), perf_counter()
+    place = kept.place_of(source, (units, fixed, tolerances, friction, options))
+    if place is not None and (known := kept.load(place)) is not None:
+        return known
     contents = _read(source, options)
     contents, notes = in_units(contents, None if units is None else unit(units), source)
     if contents.separate:
@@ -132,6 +145,7 @@ def load(
         parts=tuple(replace(part, name=name) for part, name in zip(contents.parts, names)),
         fixed=(*contents.fixed, *fixed),
         tolerances=tolerances or contents.tolerances,
+        touching_gaps=touching_gaps,
         friction=contents.friction if friction is None else friction,
         notes=(*notes, *contents.notes, *renamed),
         subassemblies={
@@ -139,7 +153,10 @@ def load(
             **{name: tuple(names[n] for n in numbers) for name, (_, numbers) in zip(called, nested)},
         },
     )
-    return _checked(contents, str(source), progress)
+    assembly = _checked(contents, str(source), progress)
+    if place is not None and perf_counter() - start > SLOW:
+        kept.store(place, assembly)
+    return assembly
 
 
 def from_meshes(
@@ -174,11 +191,12 @@ def _checked(contents: Contents, source: str, progress: Progress) -> Assembly:
     mated, mating, deep = mating_tolerances(surfaces, mask, contents.tolerances)
     if faults or deep:
         raise FaultyPartsError(source, [*faults, *deep], contents.hint)
+    mated, near = with_clearances(surfaces, mated, contents.units, touching=contents.touching_gaps)
     ground = float(bodies.bounds[:, 0, 2].min()) if contents.table is None else contents.table
     loose = floating(surfaces, mask, ground, mated.touch * bodies.smallest_extent)
     progress(total, total)
     friction = FRICTION if contents.friction is None else contents.friction
-    notes = (*contents.notes, *mended, *mating, *loose)
+    notes = (*contents.notes, *mended, *mating, *near, *loose)
     groups = (contents.keep, contents.piece_groups, contents.subassemblies)
     made = Assembly(parts, contents.table, friction, mated, held, contents.units, notes, *groups)
     keep_together(made)  # refuses groups that are none

@@ -14,9 +14,10 @@ from neurosym.geometry.mesh.triangles import distances
 from neurosym.geometry.notes import Note
 from neurosym.geometry.tolerances import DEFAULT_TOLERANCES, Tolerances
 
-#: The touching tolerance is raised to the measured overlap times `ABOVE`, or to `WIDEST` where that is enough: measured
-#: on timber joints, answers hold so far.
-ABOVE, WIDEST = 1.2, 5e-2
+#: The touching tolerance is at least the measured overlap times `ABOVE`, or `WIDEST` where that is enough: measured on
+#: timber joints, answers hold so far. It is never less than the overlap times `MARGIN`, for what is within touch in one
+#: measure may be beyond it in another.
+ABOVE, WIDEST, MARGIN = 1.2, 5e-2, 1.03
 
 #: A touching tolerance beyond this share of the smallest extent is not to be had on the command line.
 MAX_TOUCH = 0.5
@@ -44,11 +45,15 @@ def mating_tolerances(
     deep = {pair: depth for pair, depth in deepest.items() if pair not in slight}
     faults = [_too_deep(bodies, *pair, depth, limit, same=pair in same) for pair, depth in deep.items()]
     share = max(slight.values(), default=0.0) / smallest
-    if stated or share <= tolerances.touch:
+    touch = max(min(ABOVE * share, WIDEST), MARGIN * share)
+    if touch <= tolerances.touch or (stated and MARGIN * share <= tolerances.touch):
         return tolerances, [], faults
     pair, depth = max(slight.items(), key=lambda item: item[1])
     a, b = (bodies.parts[i].name for i in pair)
-    touch = max(min(ABOVE * share, WIDEST), 1.01 * share)
+    if stated:
+        sentence = f"Parts {a!r} and {b!r} overlap by {depth:.4g}, more than the stated touch of "
+        sentence += f"{tolerances.touch * smallest:.4g}: such parts may seem to block one another where they mate."
+        return tolerances, [Note(a, "mating", depth, sentence, f"State no touch, or one of {touch:.2g}.", b)], faults
     pairs = "one pair of parts" if len(slight) == 1 else f"{len(slight)} pairs of parts"
     sentence = f"Mating faces of {pairs} overlap, by up to {depth:.4g} between {a!r} and {b!r}; "
     sentence += f"overlaps up to {touch * smallest:.4g} ({touch:.2g} of the smallest extent) are taken for touch."

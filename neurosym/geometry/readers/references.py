@@ -21,12 +21,13 @@ from neurosym.support.progress import Progress, silent
 class Reading:
     """How an assembly is read, where its files leave it open; None: as `load` does by itself.
 
-    `touch` is `Tolerances.touch`; `puzzle` the number of a puzzle's problem; `joint` the values of a robot's joints.
+    `touch` is `Tolerances.touch`, or "auto": faces of parts drawn with play touch; `puzzle` the number of a puzzle's
+    problem; `joint` the values of a robot's joints.
     """
 
     units: str | None = None
     up: str | None = None
-    touch: float | None = None
+    touch: float | str | None = None
     friction: float | None = None
     puzzle: int | None = None
     solution: int | None = None
@@ -37,7 +38,10 @@ class Reading:
         """The assembly at a path; raises what `neurosym.geometry.readers.loading.load` does."""
         asked: dict[str, Any] = {"units": self.units, "up": self.up, "friction": self.friction, "joints": self.joint}
         asked |= {"problem": self.puzzle, "solution": self.solution, "meshes": self.meshes}
-        asked |= {"tolerances": None if self.touch is None else Tolerances(touch=self.touch)}
+        if self.touch == "auto":
+            asked |= {"touching_gaps": True}
+        elif self.touch is not None:
+            asked |= {"tolerances": Tolerances(touch=float(self.touch))}
         return Assembly.load(path, progress=progress, **{k: v for k, v in asked.items() if v is not None})
 
     def as_json(self) -> dict[str, Any]:

@@ -72,3 +72,16 @@ def parts_to_hold(standing: Callable[[int], Standing], hands: int, most: int) ->
         return None
 
     return search(0, most), motions
+
+
+def all_falling(standing: Callable[[int, int], Standing], subset: int, falling: int) -> int:
+    """Bitset of all parts of a subset that fall, some of which are known: what falls though these are held falls, too.
+
+    Args:
+        standing: whether a subset stands when the parts in a bitset are held.
+    """
+    while falling and not (more := standing(subset, falling)).stands:
+        if not more.falling & ~falling:
+            break
+        falling |= more.falling
+    return falling
