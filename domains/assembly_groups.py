@@ -60,7 +60,7 @@ def apart_in_groups(
     """The problem in which an action, named by a part, splits that part's block."""
     pairs, assembly = tuple(before), geometry.assembly
     anchors = assembly.fixed or (_lowest(geometry, setting, pairs),)
-    split = Action("split", _p, pre=[~apart(_p), ~anchor(_p)], eff=[apart(_p)], label="{p}")
+    split = Action("split", _p, pre=[~apart(_p), ~anchor(_p)], eff=[apart(_p)], label="{p}", once=True)
     return Domain("assembly-groups", fluents=[apart, anchor], actions=[split]).problem(
         world=geometry,
         objects={part: assembly.names},

@@ -41,7 +41,7 @@ def removal_domain(setting: Setting) -> Domain:
         possible = [stands_at_first(setting)(), drawn_out(setting, can_leave(setting), present)(_p)]
     elif setting.gravity:
         possible += [stands_at_first(setting)(), predicates.stable_without(present, held=setting.held)(_p)]
-    remove = Action("remove", _p, pre=[present(_p), ~fixed(_p), *possible], eff=[~present(_p)], label="{p}")
+    remove = Action("remove", _p, pre=[present(_p), ~fixed(_p), *possible], eff=[~present(_p)], label="{p}", once=True)
     return Domain("assembly", fluents=[present, fixed], actions=[remove])
 
 

@@ -64,6 +64,5 @@ def all_slots_filled(world: Reference, state: State) -> Verdict:
 
 
 _t = tile("t")
-DOMAIN = Domain(
-    "scrabble", fluents=[laid], actions=[Action("lay", _t, pre=[~laid(_t), matches(_t)], eff=[laid(_t)], label="{t}")]
-)
+_lay = Action("lay", _t, pre=[~laid(_t), matches(_t)], eff=[laid(_t)], label="{t}", once=True)
+DOMAIN = Domain("scrabble", fluents=[laid], actions=[_lay])

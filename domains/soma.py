@@ -29,7 +29,7 @@ _p = piece("p")
 def _take_apart(rule: str) -> Domain:
     asked = [predicates.free(present), predicates.stable_without(present)]
     geometry = [predicate(_p) for predicate in (asked if rule == "rigid" else [keeps_standing(present, rule)])]
-    remove = Action("remove", _p, pre=[present(_p), *geometry], eff=[~present(_p)], label="{p}")
+    remove = Action("remove", _p, pre=[present(_p), *geometry], eff=[~present(_p)], label="{p}", once=True)
     return Domain(f"soma-{rule}", fluents=[present], actions=[remove])
 
 

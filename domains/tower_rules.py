@@ -88,5 +88,6 @@ rests = Derived("rests", [block], _rests)
 finished = Derived("finished", [], _finished)
 
 _b = block("b")
-place = Action("place", _b, pre=[stocked(_b), unused(_b), matches(_b), rests(_b)], eff=[placed(_b)], label="{b}")
+_needs = [stocked(_b), unused(_b), matches(_b), rests(_b)]
+place = Action("place", _b, pre=_needs, eff=[placed(_b)], label="{b}", once=True)
 TOWER = Domain("tower", fluents=[placed, stocked], actions=[place])

@@ -20,7 +20,7 @@ present = ns.Fluent("present", part)
 stable_without = ns.predicates.stable_without(present)  # friction, contacts and masses: a linear program
 
 w = weight("w")
-take = ns.Action("take", w, pre=[present(w), stable_without(w)], eff=[~present(w)], label="{w}")
+take = ns.Action("take", w, pre=[present(w), stable_without(w)], eff=[~present(w)], label="{w}", once=True)
 BALANCE = ns.Domain("balance", fluents=[present], actions=[take])
 
 #: Each weight is a stack of two cells, so many cells left (-) or right (+) of the post.

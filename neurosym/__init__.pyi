@@ -17,13 +17,18 @@ from .language import (
     Derived as Derived,
     Domain as Domain,
     Fluent as Fluent,
+    Function as Function,
     GroundProblem as GroundProblem,
     Problem as Problem,
     Semantics as Semantics,
     State as State,
     Type as Type,
     derived as derived,
+    exists as exists,
+    forall as forall,
+    implies as implies,
     predicates as predicates,
+    when as when,
 )
 from .language.demonstrations import Demonstrations as Demonstrations
 from .language.problem_family import ProblemFamily as ProblemFamily
@@ -33,12 +38,20 @@ from .language.search_problem import (
     Step as Step,
     Verdict as Verdict,
 )
+from .interop import register_engine as register_engine
+from .pddl.lifted import to_pddl as to_pddl
+from .pddl.reading import (
+    from_pddl as from_pddl,
+    from_unified_planning as from_unified_planning,
+    to_unified_planning as to_unified_planning,
+)
 from .pipeline import (
     count_plans as count_plans,
     order_marginals as order_marginals,
     plans as plans,
     solve as solve,
 )
+from .planning.action_elimination import without_needless as without_needless
 from .planning.budget import Budget as Budget
 from .planning.order_scores import OrderScores as OrderScores
 from .planning.planner import Planner as Planner, PlannerTraits as PlannerTraits

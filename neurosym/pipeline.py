@@ -62,9 +62,16 @@ def solve(
         ContractError: the planner's plan does not survive its replay.
     """
     if planner is None:
-        planner = getattr(problem, "semantics", Semantics()).planner
+        planner = suited_planner(problem)
     options: dict[str, Any] = {"planner": planner, "prior": prior, "budget": budget, "rng": rng, "oracle": oracle}
     return plans(problem, k=None, side=side, **options)[0]
+
+
+def suited_planner(problem: Problem) -> str:
+    """The name of the planner that suits a problem: greedy search where actions may be done again, else its own."""
+    if isinstance(problem, Problem) and problem.ground() is problem.symbols and problem.symbols.repeating:
+        return "greedy"
+    return getattr(problem, "semantics", Semantics()).planner
 
 
 def plans(
@@ -137,7 +144,8 @@ def search_and_check(
                     with open_oracle(problem, oracle) as fresh:
                         confirm(planner, result.plan, replay(fresh, result.plan))
             except OutOfTime:
-                nothing: dict[str, Any] = {"plan": None, "motions": (), "cost": None, "fewest": None}
+                nothing: dict[str, Any] = {"plan": None, "motions": ()}
+                nothing |= dict.fromkeys(("cost", "fewest", "total_cost", "cheapest"))
                 return results[:i] or [replace(result, status=Status.OUT_OF_BUDGET, **nothing)]
     return results
 

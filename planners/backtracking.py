@@ -24,7 +24,7 @@ class Backtracking(TwoSidedSearchPlanner):
     With scores, the next action is the first of the cheapest completion (`planners.assignment_heuristic`) that is not
     known to be refused; a completion is kept for as long as the search keeps to it, so a good prior costs one
     assignment. Among equals, and without scores: what rejections named last, then the rng. A state with the set of
-    used actions that was found dead is never entered again.
+    used actions that was entered is never entered again: it is dead, or lies on the path.
     """
 
     traits = PlannerTraits(complete=True, either_side=True)
@@ -49,13 +49,13 @@ class DepthFirst:
         self.context = context
         heuristic = None if context.scores is None else AssignmentHeuristic(context.scores, context.rng)
         self.heuristic = None if heuristic is None or heuristic.indifferent else heuristic
-        self.dead: set[tuple[Any, int]] = set()
+        self.entered: set[tuple[Any, int]] = set()  # left again, and so dead, or on the path to where it is
         self.rank = context.rng.permutation(len(context.classes))  # the last tie-breaker
 
     def run(self) -> Generator[int, None, Node | None]:
         """Where the first plan ends, or meets the search from the other side, or None; an attempt at a time."""
         context, is_goal = self.context, self.context.problem.is_goal
-        root = _Node(context.problem.initial)
+        root = _Node(context.problem.initial, repeating=context.repeating)
         if is_goal(root.state):
             return root
         self._enter(root)
@@ -63,7 +63,6 @@ class DepthFirst:
         while node is not None:
             action = self._next_action(node)
             if action is None:
-                self.dead.add((node.state, node.used))
                 context.deviated = True
                 context.path.pop(node.state, None)
                 node = node.parent
@@ -76,7 +75,7 @@ class DepthFirst:
                 child = node.child(action, answer)
                 if is_goal(child.state) or context.meets(child):
                     return child
-                if (child.state, child.used) not in self.dead:
+                if context.key(child) not in self.entered:
                     self._enter(child)
                     node = child
             yield node.depth
@@ -84,6 +83,7 @@ class DepthFirst:
 
     def _enter(self, node: _Node) -> None:
         context = self.context
+        self.entered.add(context.key(node))
         node.untried = context.nogoods.allowed(node, context.expand(node.state, node.used))
         context.path[node.state] = node
 
@@ -101,7 +101,9 @@ class DepthFirst:
             return False
         # From the full side what leads to a dead state is asked for even so: its rejections are what is counted.
         after = getattr(self.context.problem, "apply", None) if self.context.from_goal else None
-        return after is None or (after(node.state, action), node.used | 1 << action) not in self.dead
+        if after is None:
+            return True
+        return self.context.key(_Node(after(node.state, action), node.used | 1 << action)) not in self.entered
 
     def _foremost_untried(self, node: _Node) -> int | None:
         options = node.untried

@@ -14,6 +14,8 @@ from neurosym.language.search_problem import Rejection
 from neurosym.planning.planner import PlannerTraits
 from neurosym.planning.result import PlanResult, Status
 from planners.assignment_heuristic import RESOLUTION, AssignmentHeuristic
+from planners.heuristic_search import HeuristicSearch
+from planners.heuristics import ADMISSIBLE, HEURISTICS, Heuristic
 from planners.node import Node
 from planners.priorities import PartialPlan, Priority, astar, greedy, levin, weighted
 from planners.search_context import BudgetSpent, SearchContext
@@ -30,14 +32,24 @@ class BestFirst(TwoSidedSearchPlanner, KBestSearchPlanner):
 
     Among equals the deepest comes first, then the rng decides. Nodes are keyed on (state, used actions).
 
+    Without scores, where actions have costs or may be done again, it goes by these costs and a heuristic
+    (`planners.heuristic_search`): A* by an admissible one is optimal, and says so (`PlanResult.cheapest`, or `fewest`).
+    With scores and a heuristic, "greedy" goes by the sum of the heuristic and of the nats that an action costs more
+    than the prior's best completion; "astar" and "weighted" go by the scores, and the heuristic only takes out states
+    from which there is no way.
+
     Args:
         priority: "astar", "weighted", "greedy", "levin", or a function of `planners.priorities.PartialPlan`.
         weight: of the cost-to-go in "weighted"; at least 1.
+        heuristic: one of `planners.heuristics.HEURISTICS`, for problems that offer their ground task. Default: where it
+            is needed "ff" for greedy search, else "max".
     """
 
     traits = PlannerTraits(complete=True, optimal=True, k_best=True, either_side=True)
 
-    def __init__(self, *, priority: str | Priority = "astar", weight: float = 2.0) -> None:
+    def __init__(
+        self, *, priority: str | Priority = "astar", weight: float = 2.0, heuristic: str | None = None
+    ) -> None:
         if not weight >= 1:
             raise InputError(f"Expected a weight of at least 1; got {weight}.")
         known = {"astar": astar, "weighted": weighted(weight), "greedy": greedy, "levin": levin}
@@ -45,15 +57,42 @@ class BestFirst(TwoSidedSearchPlanner, KBestSearchPlanner):
             if priority not in known:
                 raise UnknownNameError("priority", priority, known)
             priority = known[priority]
+        if heuristic is not None and heuristic not in HEURISTICS:
+            raise UnknownNameError("heuristic", heuristic, HEURISTICS)
         self.priority: Priority = priority
+        self.heuristic = heuristic
+        #: Of the heuristic, beside the cost so far.
+        self.weight = 1.0 if priority is astar else math.inf if priority is greedy else weight
         self.traits = PlannerTraits(complete=True, optimal=priority is astar, k_best=True, either_side=True)
 
     def steps(self, context: SearchContext) -> Steps:
-        for at in _BestFirst(context, self.priority, 1).results():
+        heuristic = self._heuristic(context)
+        if heuristic is not None and (context.scores is None or self.priority is greedy):
+            return (yield from self._by_heuristic(context, heuristic))
+        for at in _BestFirst(context, self.priority, 1, heuristic).results():
             if isinstance(at, PlanResult):
                 return at
             yield at
         return context.failed(Status.UNSOLVABLE)
+
+    def _heuristic(self, context: SearchContext) -> Heuristic | None:
+        """What the search goes by besides scores, if anything."""
+        problem = context.problem
+        if self.heuristic is None and not (context.repeating or getattr(problem, "costs", None) is not None):
+            return None
+        name = self.heuristic or ("ff" if self.priority is greedy else "max")
+        return Heuristic.of(problem, name, inflated=self.priority is greedy)
+
+    def _by_heuristic(self, context: SearchContext, heuristic: Heuristic) -> Steps:
+        goal = yield from HeuristicSearch(context, heuristic, self.weight).run()
+        if goal is None:
+            return context.failed(Status.UNSOLVABLE)
+        proved: bool | None = self.weight == 1 and heuristic.name in ADMISSIBLE and context.log.all_proved
+        if math.isinf(self.weight):
+            proved = None  # nobody asked
+        if getattr(context.problem, "costs", None) is None:
+            return context.solved(goal, fewest=proved)
+        return context.solved(goal, cheapest=proved)
 
     def search_k_best(self, context: SearchContext, k: int) -> list[PlanResult]:
         results: list[PlanResult] = []
@@ -62,6 +101,11 @@ class BestFirst(TwoSidedSearchPlanner, KBestSearchPlanner):
             for result in islice(plans, k):
                 results.append(result)  # noqa: PERF402 (what came before the budget's end is kept)
         return sorted(results, key=lambda result: result.cost or 0.0)
+
+
+def greedy_best_first(*, heuristic: str | None = None) -> BestFirst:
+    """Greedy best-first search: a plan soon, which need not be a cheap one."""
+    return BestFirst(priority="greedy", heuristic=heuristic)
 
 
 @dataclass(slots=True, eq=False)
@@ -87,7 +131,10 @@ class _Goal(NamedTuple):
 
 
 class _BestFirst:
-    def __init__(self, context: SearchContext, priority: Priority, k: int) -> None:
+    def __init__(
+        self, context: SearchContext, priority: Priority, k: int, pruning: Heuristic | None = None
+    ) -> None:
+        self.pruning = pruning
         self.context, self.priority, self.k = context, priority, k
         self.heuristic = None if context.scores is None else AssignmentHeuristic(context.scores, context.rng)
         self.lazy = priority is astar  # only there is a node's cost a bound on all that come from it
@@ -101,7 +148,7 @@ class _BestFirst:
         After each attempt that ends in no plan the depth of the state in which it was made.
         """
         context, is_goal = self.context, self.context.problem.is_goal
-        root = _Node(context.problem.initial)
+        root = _Node(context.problem.initial, repeating=context.repeating)
         if is_goal(root.state):
             yield context.solved(root)
             return
@@ -121,7 +168,7 @@ class _BestFirst:
                     self._push(key, child.depth, _Goal(child))
                 else:
                     yield context.solved(child)
-            elif self.expanded[child.state, child.used] < self.k:
+            elif self.expanded[context.key(child)] < self.k:
                 # The k cheapest orders that lead to a node are all that the k best plans can need of it.
                 self._expand(child)
                 yield entry.node.depth
@@ -143,8 +190,10 @@ class _BestFirst:
 
     def _expand(self, node: _Node) -> None:
         """Queue what may be tried next: one by one, or, while the best completion is known, that and the others."""
+        if self.pruning is not None and math.isinf(self.pruning(node.state).value):
+            return
         node.waiting = self.context.expand(node.state, node.used)
-        self.expanded[node.state, node.used] += 1
+        self.expanded[self.context.key(node)] += 1
         if not node.waiting:
             return
         if not self.lazy:  # A* asks for no policy

@@ -98,7 +98,7 @@ class _Search:
         self, context: SearchContext, *, greedy: bool = False, below: int | None = None, most: int | None = None
     ) -> None:
         self.context, self.greedy, self.below, self.most = context, greedy, below, most
-        self.root = _Node(context.problem.initial)
+        self.root = _Node(context.problem.initial, repeating=context.repeating)
         self.exhausted, self.found = False, cast(_Node | None, None)
         self.queue: list[_Entry] = []
         self.pushed = 0
@@ -108,7 +108,7 @@ class _Search:
         context, is_goal = self.context, self.context.problem.is_goal
         if is_goal(self.root.state):
             return self.root
-        expanded = {(self.root.state, 0)}
+        expanded = {context.key(self.root)}
         self._expand(self.root)
         while self.queue:
             entry = heapq.heappop(self.queue)
@@ -130,8 +130,8 @@ class _Search:
                 self.found, self.below = child, child.depth
                 if self.greedy:
                     return child
-            elif (child.state, child.used) not in expanded:
-                expanded.add((child.state, child.used))
+            elif context.key(child) not in expanded:
+                expanded.add(context.key(child))
                 self._expand(child)
         self.exhausted = True
         return self.found

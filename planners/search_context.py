@@ -32,6 +32,7 @@ class SearchContext:
         deviated: whether the search had to leave the first complete order that it tried.
         beside: that of a search of the same problem from its other end, if there is one.
         path: of a depth-first search, the nodes from its root to where it is, by their states.
+        repeating: a bitset of the actions that may be done any number of times.
     """
 
     def __init__(
@@ -47,11 +48,20 @@ class SearchContext:
         if beside is not None:
             beside.beside = self
         self.classes = tuple(problem.classes)
+        self.repeating: int = getattr(problem, "repeating", 0)
+        if scores is not None and self.repeating:
+            repeated = problem.actions[(self.repeating & -self.repeating).bit_length() - 1]
+            raise InputError(
+                f"Expected a problem whose actions are done once each, to be ordered by a prior; {repeated} may be "
+                "done again. Leave the prior out and plan with a heuristic, or say once=True of the actions."
+            )
         self.scores = None if scores is None else _fitted(scores, tuple(problem.actions), self.classes)
+        # Under scores the step matters, too, which the number of used actions tells.
+        self._remembered: int = getattr(problem, "remembered", -1) if scores is None else -1
         self.rng = rng or np.random.default_rng(0)
         self.log: SearchLog[Any] = SearchLog(problem, budget, beside=None if beside is None else beside.log)
         self.path: dict[Any, Node] = {}
-        self.nogoods: Nogoods = Nogoods(None if beside is None else beside.nogoods)
+        self.nogoods: Nogoods = Nogoods(None if beside is None else beside.nogoods, repeating=self.repeating)
         self.preferred = PreferredActions(problem.actions)
         self.deviated = False
         self._answers: dict[tuple[Any, int], Step[Any] | Rejection] = {}
@@ -69,6 +79,14 @@ class SearchContext:
     def from_goal(self) -> bool:
         """Whether this is the search from the goal."""
         return self.log.side == "empty"
+
+    def key(self, node: Node) -> tuple[Any, int]:
+        """What tells two nodes apart: the state, and which actions were used, as far as the state does not say it."""
+        return self.key_of(node.state, node.used)
+
+    def key_of(self, state: Any, used: int) -> tuple[Any, int]:
+        """The same of a state and a bitset of used actions."""
+        return state, used & self._remembered
 
     def check_budget(self) -> None:
         if self.log.out_of_budget():
@@ -95,7 +113,7 @@ class SearchContext:
         answer = self._answers.get((node.state, action))
         if answer is None:
             self.check_budget()
-            answer = self.log.attempt(node.prefix(), node.state, action)
+            answer = self.log.attempt(node, node.state, action)
             if self.log.timed_out:
                 raise BudgetSpent
             self._answers[node.state, action] = answer
@@ -124,11 +142,11 @@ class SearchContext:
         """Of a plan's length under the scores (nats); 0 without any."""
         return 0.0 if self.scores is None else self.scores.length_cost(steps)
 
-    def solved(self, node: Node, *, fewest: bool | None = None) -> PlanResult:
+    def solved(self, node: Node, *, fewest: bool | None = None, cheapest: bool | None = None) -> PlanResult:
         """The result for the plan that led to `node`; whether it has the fewest actions, as far as that is known."""
         if self.beside is not None and self.from_goal:
             return self._solved(node.path()[::-1], self.beside.scores)
-        return self._solved(node.path(), self.scores, fewest)
+        return replace(self._solved(node.path(), self.scores, fewest), cheapest=cheapest)
 
     def meets(self, node: Node) -> bool:
         """Whether the search from the other end is at the state of `node`."""

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from neurosym.errors import InputError
 from neurosym.geometry.step_motion import StepMotion
 from neurosym.language.search_problem import SearchProblem, Step
 from neurosym.planning.budget import Budget
@@ -47,11 +48,15 @@ class StateGraph:
     def __init__(self, context: SearchContext, *, shuffled: bool = False) -> None:
         self.context, self.shuffled, self.complete = context, shuffled, True
         initial = context.problem.initial
-        self.root = StateNode(initial, is_goal=context.problem.is_goal(initial))
+        self.root = StateNode(initial, is_goal=context.problem.is_goal(initial), repeating=context.repeating)
         self.layers: list[list[StateNode]] = []
         below: dict[tuple[Any, int], StateNode] = {(initial, 0): self.root}
+        #: Where actions may be done again, what an earlier layer has: no shortest order comes back there.
+        self.earlier: set[tuple[Any, int]] = set()
         while below and self.complete:
             self.layers.append(list(below.values()))
+            if context.repeating:
+                self.earlier.update(below)
             below = {}
             try:
                 for node in self.layers[-1]:
@@ -71,9 +76,12 @@ class StateGraph:
         for action in actions:
             answer = self.context.attempt(node, action)
             if isinstance(answer, Step):
-                key = (answer.state, node.used | 1 << action)
+                child = node.child(action, answer)
+                key = (answer.state, child.used)
+                if key in self.earlier:
+                    continue
                 if key not in below:
-                    below[key] = node.child(action, answer)
+                    below[key] = child
                     below[key].is_goal = self.context.problem.is_goal(answer.state)
                 node.edges.append(Edge(action, answer.motion, below[key]))
 
@@ -220,4 +228,10 @@ def all_plans(problem: SearchProblem[Any]) -> Iterator[tuple[str, ...]]:
 
 def _context(problem: Any, budget: Budget | None = None) -> SearchContext:
     """Of the search problem that was given, or that a user's problem grounds to."""
-    return SearchContext(problem.ground() if hasattr(problem, "ground") else problem, budget=budget)
+    context = SearchContext(problem.ground() if hasattr(problem, "ground") else problem, budget=budget)
+    if context.repeating:
+        raise InputError(
+            "Expected a problem whose actions are done once each, to count orders or to list them; where actions may "
+            "be done again there is no end of orders. Say once=True of the actions, or ask for one plan."
+        )
+    return context

@@ -165,6 +165,23 @@ def test_a_bearing_block_has_the_same_answers_in_every_format(tmp_path):
     assert not {("pin 0", "base"), ("outer ring", "housing"), ("shaft", "inner ring")} & up  # pressed in, not stuck
 
 
+def test_tools_are_changed_once_and_the_film_shows_every_step(capsys):
+    result = load("tools").main()
+    assert result.cheapest
+    assert result.total_cost == 28
+    assert [step.split("(")[0] for step in result.plan].count("pick_tool") == 2
+    assert "none costs less: True" in capsys.readouterr().out
+    from neurosym.planning.staging import stage
+    from neurosym.simulation.animation import frames
+    from neurosym.simulation.storyboard import describe
+
+    staging = stage(load("tools").problem(), result.plan, result.motions)
+    words = [describe(staging, i) for i in range(len(staging.plan))]
+    assert [w for w in words if w.startswith("pick_tool")] == [s for s in result.plan if s.startswith("pick_tool")]
+    assert staging.there(11) == ("box",)
+    assert sum(1 for _ in frames(staging, size=(80, 60))) > 2 * len(words)
+
+
 def test_the_notebook_runs_and_shows_tables_and_figures(tmp_path):
     """As a notebook runs it, in a kernel of its own: results are tables, figures are pictures, no cell fails."""
     nbclient = pytest.importorskip("nbclient", reason="nbclient is not installed (extra dev)")

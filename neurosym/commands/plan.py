@@ -24,6 +24,7 @@ from neurosym.commands.common import (
     say,
     write_json,
 )
+from neurosym.commands.plan_pddl import plan_pddl
 from neurosym.commands.plan_text import show
 from neurosym.commands.spent import Spent
 from neurosym.commands.widening import widened
@@ -47,13 +48,18 @@ def plan(
         typer.Argument(
             metavar="PATH|DOMAIN",
             help="An assembly of yours (a folder with one mesh a part, a scene, a puzzle, an assembly's JSON), or a "
-            "problem family; `neurosym list` names them.",
+            "problem family; `neurosym list` names them. With --pddl, a problem in PDDL.",
         ),
     ],
     *,
     number: Annotated[int | None, typer.Option("--problem", metavar="N", help="Number of the problem.")] = None,
+    pddl: Annotated[Path | None, typer.Option(metavar="FILE", help="The domain, in PDDL, of the problem.")] = None,
     planner: Annotated[
-        str | None, typer.Option(metavar="P", help="Default backtracking; --k: best-first; --target: fewest.")
+        str | None,
+        typer.Option(metavar="P", help="Default backtracking; --k: best-first; --target: fewest; --pddl: greedy."),
+    ] = None,
+    heuristic: Annotated[
+        str | None, typer.Option(metavar="H", help="Of best-first and greedy: ff, add, max, goals, none.")
     ] = None,
     search: SearchOptions,
     pictures: PictureStyle = "clean",
@@ -81,12 +87,14 @@ def plan(
     """
     from neurosym.experiments.benchmark import NO_PRIOR
     from neurosym.geometry.readers.references import reference
-    from neurosym.pipeline import plans, solve
+    from neurosym.pipeline import plans, solve, suited_planner
     from neurosym.planning.budget import Budget
     from neurosym.planning.result import Status
     from neurosym.planning.sturdiness import SturdyPlan, sturdiest_plan
-    from neurosym.registry import load_domain
+    from neurosym.registry import load_domain, load_planner
 
+    if pddl is not None:
+        raise typer.Exit(plan_pddl(pddl, Path(what), planner, heuristic, search, out, as_json))
     assembly: Assembly | None = None
     spent = Spent()
     cells = search.own_cells()
@@ -119,12 +127,15 @@ def plan(
         prior = NO_PRIOR if path is None else UNTRAINED
     budget = Budget(seconds=search.seconds, attempts=search.attempts, expansions=expansions)
     settings: dict[str, Any] = {
-        "planner": planner or (problem.semantics.planner if k is None else "best-first"),
+        "planner": planner or (suited_planner(problem) if k is None else "best-first"),
         "prior": None if prior == NO_PRIOR else prior,
         "budget": budget,
         "oracle": search.oracle,
         "side": side,
     }
+    name = settings["planner"]
+    if heuristic is not None:
+        settings["planner"] = load_planner(name, heuristic=heuristic)
     settings["budget"] = budget.less(spent.seconds)
     sturdiest: SturdyPlan | None = None
     if sturdy and (path is None or k is not None or removal.tilt is not None):
@@ -148,6 +159,7 @@ def plan(
         **problem_part(family.name, problem, number, options),
         **source,
         **settings,
+        **({} if heuristic is None else {"planner": name, "heuristic": heuristic}),
         "budget": budget.limits,
         "seed": search.seed,
         **result_part(results[0]),

@@ -2,6 +2,8 @@
 
 from neurosym.language import predicates
 from neurosym.language.actions import Action
+from neurosym.language.conditions import Condition, exists, forall, implies, when
+from neurosym.language.costs import Function
 from neurosym.language.domain import Domain
 from neurosym.language.grounding import GroundProblem
 from neurosym.language.problem import Problem, Simulation
@@ -12,9 +14,11 @@ from neurosym.language.terms import Atom, Derived, Fluent, Literal, Type, Variab
 __all__ = [
     "Action",
     "Atom",
+    "Condition",
     "Derived",
     "Domain",
     "Fluent",
+    "Function",
     "GroundProblem",
     "Literal",
     "Problem",
@@ -24,5 +28,9 @@ __all__ = [
     "Type",
     "Variable",
     "derived",
+    "exists",
+    "forall",
+    "implies",
     "predicates",
+    "when",
 ]

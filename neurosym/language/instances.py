@@ -2,35 +2,72 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from graphlib import CycleError, TopologicalSorter
 from typing import TYPE_CHECKING
 
 from neurosym.errors import DefinitionError, UnknownNameError
-from neurosym.language.terms import Atom, Derived, Fluent, Literal
+from neurosym.language.conditions import FALSE, TRUE, And, Condition, Equality, Or
+from neurosym.language.costs import cost_of
+from neurosym.language.terms import Atom, Derived, Fluent, Literal, Predicate, Variable, bound
 
 if TYPE_CHECKING:
+    from neurosym.language.actions import Action
     from neurosym.language.problem import Problem
+
+#: More ground actions than this are refused: the definition wants a static fluent that narrows its parameters.
+MAX_GROUND_ACTIONS = 1_000_000
 
 
 class Instance:
-    """A ground action before it has bits."""
+    """A ground action before it has bits: literals (`fluents`, `derived`), other `conditions`, and effects."""
 
-    def __init__(self, name: str, pre: Sequence[Literal], eff: Sequence[Literal]) -> None:
-        self.name = name
-        self.fluents = [p for p in pre if not isinstance(p.atom.predicate, Derived)]
-        self.derived = [p for p in pre if isinstance(p.atom.predicate, Derived)]
-        self.eff = eff
+    def __init__(self, action: Action, binding: Mapping[str, str], name: str, pre: Condition, problem: Problem) -> None:
+        self.name, self.once = name, action.once
+        parts = pre.parts if isinstance(pre, And) else (pre,)
+        literals = [p for p in parts if isinstance(p, Literal)]
+        self.fluents = [p for p in literals if not isinstance(p.atom.predicate, Derived)]
+        self.derived = [p for p in literals if isinstance(p.atom.predicate, Derived)]
+        self.conditions = [p for p in parts if not isinstance(p, Literal)]
+        self.eff = [e.bind(binding) for e in action.eff]
+        self.conditional = [
+            pair for each in action.conditional for pair in each.ground(binding, problem.objects_of)
+        ]
+        place = f"problem {problem.name!r}, {name}"
+        self.cost = 0.0 if action.cost is None else cost_of(action.cost, binding, problem.values, place)
+
+    def effects(self) -> Iterator[Literal]:
+        """All effects, conditional or not."""
+        yield from self.eff
+        yield from (effect for _, effect in self.conditional)
+
+    def mentioned(self) -> Iterator[Literal]:
+        """Every literal of a fluent in it."""
+        yield from self.fluents
+        yield from self.effects()
+        for condition in (*self.conditions, *(c for c, _ in self.conditional)):
+            yield from (p for p in condition.literals() if not isinstance(p.atom.predicate, Derived))
 
 
-def instantiate(problem: Problem) -> tuple[list[Instance], list[str]]:
-    """The ground actions whose static fluents hold, and the names of all of them."""
-    changed = {e.atom.predicate for a in problem.domain.actions for e in a.eff}
+def instantiate(problem: Problem) -> list[Instance]:
+    """The ground actions whose static fluents hold, in the order of the objects."""
+    changed = {e.atom.predicate for a in problem.domain.actions for e in a.changed()}
     initial = set(problem.init)
+    facts: dict[Predicate, set[tuple[object, ...]]] = {}
+    for atom in initial:
+        facts.setdefault(atom.predicate, set()).add(atom.args)
+
+    def known(literal: Literal) -> bool | None:
+        predicate = literal.atom.predicate
+        static = isinstance(predicate, Fluent) and predicate not in changed
+        return (literal.atom in initial) is literal.positive if static else None
+
     instances: list[Instance] = []
     seen: dict[str, str] = {}
     for action in problem.domain.actions:
-        for binding in problem.bindings(action):
+        static = [p for p in action.pre if isinstance(p.atom.predicate, Fluent) and p.atom.predicate not in changed]
+        rest = tuple(p for p in action.pre if p not in static)
+        for binding in _bindings(problem, action, static, facts):
             name = action.ground_name(binding)
             if name in seen:
                 raise DefinitionError(
@@ -38,36 +75,113 @@ def instantiate(problem: Problem) -> tuple[list[Instance], list[str]]:
                     f"({seen[name]} and {action.name} {binding}); give the action a label over all its parameters."
                 )
             seen[name] = f"{action.name} {binding}"
-            pre = [p.bind(binding) for p in action.pre]
-            static = [p for p in pre if isinstance(p.atom.predicate, Fluent) and p.atom.predicate not in changed]
-            if all((p.atom in initial) is p.positive for p in static):
-                pre = [p for p in pre if p not in static]
-                instances.append(Instance(name, pre, [e.bind(binding) for e in action.eff]))
-    return instances, list(seen)
-
-
-def reachable_instances(initial: set[Atom], instances: Sequence[Instance]) -> list[Instance]:
-    """Instances that some sequence of actions may reach, when nothing that was ever true or false is lost."""
-    true = set(initial)
-    untrue_possible = {e.atom for i in instances for e in i.eff if not e.positive}
-    waiting, found = list(instances), []
-    while True:
-        now = [
-            i
-            for i in waiting
-            if all(
-                p.atom in true if p.positive else p.atom not in initial or p.atom in untrue_possible for p in i.fluents
+            pre: Condition = And(tuple([p.bind(binding) for p in rest]))
+            if action.conditions:
+                whole = And((pre, *(c.bind(binding) for c in action.conditions)))
+                pre = simplified(whole.expanded(problem.objects_of), known)
+            if pre is FALSE:
+                continue
+            instances.append(Instance(action, binding, name, pre, problem))
+            if action.conditional:
+                made = instances[-1]
+                settled = [(simplified(c, known), e) for c, e in made.conditional]
+                made.eff += [e for c, e in settled if c is TRUE]
+                made.conditional = [(c, e) for c, e in settled if c is not TRUE and c is not FALSE]
+        if len(instances) > MAX_GROUND_ACTIONS:
+            raise DefinitionError(
+                f"In problem {problem.name!r}, action {action.name!r}: more than {MAX_GROUND_ACTIONS:,} ground "
+                "actions. Give its parameters narrower types, or a fluent that no action changes and few objects have."
             )
-        ]
-        if not now:
-            break
-        found.extend(now)
-        taken = set(map(id, now))
-        waiting = [i for i in waiting if id(i) not in taken]
-        for i in now:
-            true.update(e.atom for e in i.eff if e.positive)
-    order = {id(i): k for k, i in enumerate(instances)}
-    return sorted(found, key=lambda i: order[id(i)])
+    return instances
+
+
+def _bindings(
+    problem: Problem,
+    action: Action,
+    static: Sequence[Literal],
+    facts: Mapping[Predicate, set[tuple[object, ...]]],
+) -> Iterator[dict[str, str]]:
+    """Ways to fill the parameters, each left as soon as what does not change, or an equality, rules it out."""
+    level = {param.name: number for number, param in enumerate(action.params)}
+
+    def last(variables: Iterable[Variable]) -> int:
+        return max((level[v.name] for v in variables), default=-1)
+
+    checks: list[list[Callable[[dict[str, str]], bool]]] = [[] for _ in range(len(action.params) + 1)]
+    for literal in static:
+        there = facts.get(literal.atom.predicate, set())
+        checks[last(literal.variables()) + 1].append(
+            lambda binding, args=literal.atom.args, there=there, sign=literal.positive: (  # type: ignore[misc]
+                (bound(args, binding) in there) is sign
+            )
+        )
+    for condition in action.conditions:
+        if isinstance(condition, Equality):
+            checks[last(condition.variables()) + 1].append(lambda b, c=condition: bool(c.bind(b)))  # type: ignore[misc]
+    options = [problem.objects_of(param.type) for param in action.params]
+
+    def extend(number: int, binding: dict[str, str]) -> Iterator[dict[str, str]]:
+        if all(check(binding) for check in checks[number]):
+            if number == len(options):
+                yield binding
+                return
+            name = action.params[number].name
+            for choice in options[number]:
+                yield from extend(number + 1, {**binding, name: choice})
+
+    return extend(0, {})
+
+
+def simplified(condition: Condition, known: Callable[[Literal], bool | None]) -> Condition:
+    """An expanded condition without the literals whose truth is known."""
+    if isinstance(condition, Literal):
+        truth = known(condition)
+        return condition if truth is None else TRUE if truth else FALSE
+    assert isinstance(condition, And | Or)
+    parts = tuple(simplified(part, known) for part in condition.parts)
+    return type(condition)(parts).expanded(lambda _: ())
+
+
+def possible(condition: Condition, literal_is: Callable[[Literal], bool]) -> bool:
+    """Whether an expanded condition may hold, when each of its literals is looked at by itself."""
+    if isinstance(condition, Literal):
+        return literal_is(condition)
+    assert isinstance(condition, And | Or)
+    found = (possible(part, literal_is) for part in condition.parts)
+    return all(found) if isinstance(condition, And) else any(found)
+
+
+class Reachability:
+    """What some sequence of actions may reach when nothing that was ever true or false is lost.
+
+    Derived predicates are taken as possible.
+    """
+
+    def __init__(self, initial: set[Atom], instances: Sequence[Instance]) -> None:
+        self.initial, self.true = initial, set(initial)
+        self.untrue = {e.atom for i in instances for e in i.effects() if not e.positive}
+        waiting, reached = list(instances), set[int]()
+        while now := [i for i in waiting if self._applicable(i)]:
+            reached |= set(map(id, now))
+            waiting = [i for i in waiting if id(i) not in reached]
+            self.true.update(e.atom for i in now for e in i.effects() if e.positive)
+        self.instances = [i for i in instances if id(i) in reached]
+        self.untrue = {e.atom for i in self.instances for e in i.effects() if not e.positive}
+
+    def _applicable(self, instance: Instance) -> bool:
+        conditions = (*instance.fluents, *instance.conditions)
+        return all(possible(condition, self.may_hold) for condition in conditions)
+
+    def may_hold(self, literal: Literal) -> bool:
+        atom = literal.atom
+        if isinstance(atom.predicate, Derived):
+            return True
+        return atom in self.true if literal.positive else atom not in self.initial or atom in self.untrue
+
+
+def all_names(problem: Problem) -> list[str]:
+    """The names of all ground actions that types allow."""
+    return [a.ground_name(binding) for a in problem.domain.actions for binding in problem.bindings(a)]
 
 
 def check_precedence(before: Sequence[tuple[str, str]], names: Iterable[str], place: str) -> None:

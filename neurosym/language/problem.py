@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-from collections.abc import Iterable, Mapping, Sequence
+import re
+import string
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -15,6 +17,8 @@ import numpy as np
 from neurosym.errors import DefinitionError, InputError, UnknownNameError
 from neurosym.geometry.queries import AssemblyGeometry
 from neurosym.language.actions import Action
+from neurosym.language.conditions import Condition
+from neurosym.language.costs import Value
 from neurosym.language.semantics import Semantics
 from neurosym.language.terms import Atom, Derived, Literal, Type, Variable
 from neurosym.support.arrays import Pixels
@@ -25,10 +29,6 @@ if TYPE_CHECKING:
     from neurosym.language.domain import Domain
     from neurosym.language.grounding import GroundProblem
     from neurosym.language.search_problem import SearchProblem
-
-#: More ground actions than this are refused: the definition wants a static fluent that narrows its parameters.
-MAX_GROUND_ACTIONS = 1_000_000
-
 
 @dataclass(frozen=True)
 class Simulation:
@@ -50,7 +50,8 @@ class Problem:
     """A problem: a domain, a world, and what holds at first and at last. Made by `Domain.problem`.
 
     `world`: whatever the domain is about, for instance an `Assembly`. `geometry`: the object that answers questions
-    about a world that is an `Assembly`; None for others.
+    about a world that is an `Assembly`; None for others. `goal`: the literals of the goal; `goal_conditions`: the rest
+    of it. `values`: of functions by which actions cost. `reachable`: whether a goal out of reach is a mistake.
     """
 
     domain: Domain
@@ -67,6 +68,9 @@ class Problem:
     semantics: Semantics = field(default_factory=Semantics)
     pictures: Pixels | None = None
     geometry: AssemblyGeometry | None = None
+    goal_conditions: tuple[Condition, ...] = ()
+    values: Mapping[Value, float] = field(default_factory=dict)
+    reachable: bool = True
 
     def __post_init__(self) -> None:
         place = f"problem {self.name!r} of domain {self.domain.name!r}"
@@ -84,22 +88,35 @@ class Problem:
             if not isinstance(atom, Atom) or isinstance(atom.predicate, Derived):
                 raise DefinitionError(f"In {place}, init[{i}]: expected a fluent of objects; got {atom!s}.")
             self._check_atom(atom, f"{place}, init[{i}]")
-        for i, literal in enumerate(self.goal):
-            self._check_atom(literal.atom, f"{place}, goal[{i}]")
+        for i, goal in enumerate((*self.goal, *self.goal_conditions)):
+            if free := list(goal.variables()):
+                raise DefinitionError(
+                    f"In {place}, goal[{i}]: expected names of objects; got the variable {free[0]} in {goal}. Bind it "
+                    "with forall or exists."
+                )
+            for literal in goal.literals():
+                self._check_atom(literal.atom, f"{place}, goal[{i}]", bound=True)
+            self._check_compared(goal, f"{place}, goal[{i}]")
         for action in self.domain.actions:
-            for where, literals in (("pre", action.pre), ("eff", action.eff)):
-                for i, literal in enumerate(literals):
-                    constants = [a for a in literal.atom.args if isinstance(a, str)]
-                    if constants:
-                        self._check_args(literal.atom, f"{place}, action {action.name!r}, {where}[{i}]")
+            for condition in (*action.conditions, *(effect.condition for effect in action.conditional)):
+                self._check_compared(condition, f"{place}, action {action.name!r}")
+            for where, literal in action.every_literal():
+                if any(isinstance(a, str) for a in literal.atom.args):
+                    self._check_args(literal.atom, f"{place}, action {action.name!r}, {where}")
 
-    def _check_atom(self, atom: Atom, place: str) -> None:
+    def _check_atom(self, atom: Atom, place: str, *, bound: bool = False) -> None:
         if not isinstance(atom.predicate, Derived) and atom.predicate not in self.domain.fluents:
             known = ", ".join(f.name for f in self.domain.fluents)
             raise DefinitionError(f"In {place}: the fluent {atom.predicate} is not the domain's; expected {known}.")
-        if any(isinstance(a, Variable) for a in atom.args):
+        if not bound and any(isinstance(a, Variable) for a in atom.args):
             raise DefinitionError(f"In {place}: expected names of objects; got the variable in {atom}.")
         self._check_args(atom, place)
+
+    def _check_compared(self, condition: Condition, place: str) -> None:
+        for name in condition.compared():
+            if name not in self.type_of:
+                known = UnknownNameError("object", name, self.type_of)
+                raise DefinitionError(f"In {place}: {condition}: unknown object. {known}")
 
     def _check_args(self, atom: Atom, place: str) -> None:
         for arg, kind in zip(atom.args, atom.predicate.types):
@@ -124,19 +141,46 @@ class Problem:
 
     def objects_of(self, kind: Type) -> tuple[str, ...]:
         """Names of the objects of a type or of a type below it, in the problem's order."""
-        return tuple(name for name, actual in self.type_of.items() if actual.is_a(kind))
+        if kind not in self._objects_of:
+            self._objects_of[kind] = tuple(name for name, actual in self.type_of.items() if actual.is_a(kind))
+        return self._objects_of[kind]
 
-    def bindings(self, action: Action) -> Iterable[dict[str, str]]:
+    @cached_property
+    def _objects_of(self) -> dict[Type, tuple[str, ...]]:
+        return {}
+
+    def bindings(self, action: Action) -> Iterator[dict[str, str]]:
         """Every type-consistent way to fill an action's parameters."""
-        domains = [self.objects_of(p.type) for p in action.params]
-        count = int(np.prod([len(d) for d in domains], dtype=np.float64)) if domains else 1
-        if count > MAX_GROUND_ACTIONS:
-            raise DefinitionError(
-                f"In problem {self.name!r}, action {action.name!r}: {count:,} ways to fill its parameters, more than "
-                f"{MAX_GROUND_ACTIONS:,}. Give them narrower types."
-            )
         names = [p.name for p in action.params]
-        return (dict(zip(names, objects)) for objects in itertools.product(*domains))
+        choices = itertools.product(*(self.objects_of(p.type) for p in action.params))
+        return (dict(zip(names, objects)) for objects in choices)
+
+    def meant_by(self, name: str) -> tuple[Action, dict[str, str]] | None:
+        """The action and the objects that the name of a ground action means; None: no action has that name."""
+        for action, pattern in self._patterns:
+            if pattern is None:
+                binding = next((b for b in self.bindings(action) if action.ground_name(b) == name), None)
+                if binding is not None:
+                    return action, binding
+            elif match := pattern.fullmatch(name):
+                return action, {p.name: match[p.name] for p in action.params}
+        return None
+
+    @cached_property
+    def _patterns(self) -> list[tuple[Action, re.Pattern[str] | None]]:
+        """Of each action what its labels look like; None where a label does not say what all parameters are."""
+        patterns = []
+        for action in self.domain.actions:
+            types, text, seen = {p.name: p.type for p in action.params}, "", set[str]()
+            for literal, field_, spec, conversion in string.Formatter().parse(action.label):
+                text += re.escape(literal)
+                if field_ is not None and not (spec or conversion):
+                    names = "|".join(map(re.escape, self.objects_of(types[field_])))
+                    text += f"(?P={field_})" if field_ in seen else f"(?P<{field_}>{names})"
+                    seen.add(field_)
+            whole = seen == set(types) and all(name.isidentifier() for name in seen)
+            patterns.append((action, re.compile(text) if whole else None))
+        return patterns
 
     @cached_property
     def symbols(self) -> GroundProblem:

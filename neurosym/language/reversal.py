@@ -11,7 +11,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from neurosym.language.grounding import GroundProblem, Refused
+from neurosym.language.evidence import Refused
+from neurosym.language.grounding import GroundProblem
 from neurosym.language.search_problem import Rejection, SearchProblem, Step
 from neurosym.language.state import BitState
 from neurosym.language.terms import Derived
@@ -30,8 +31,10 @@ def effects_once(ground: GroundProblem) -> tuple[int, ...] | None:
     """What each action changes, a bitset each; None where the problem cannot be reversed.
 
     It can where no two actions change the same, all are asked for by the goal, which asks for nothing derived, and
-    none are stated to be interchangeable.
+    none are stated to be interchangeable. Nor may an action be done again.
     """
+    if ground.repeating or ground.has_conditional_effects:
+        return None
     changes = tuple((ground.initial ^ ground.apply(ground.initial, a)) for a in range(len(ground.actions)))
     final, seen = ground.initial, 0
     for change in changes:
@@ -90,7 +93,7 @@ class ReversedProblem:
             for predicate in self._of_states:
                 verdict = self.ground.judge(predicate, view)
                 if not verdict.holds:
-                    return Refused(predicate, (), True, verdict)
+                    return Refused(f"{predicate}()", True, verdict)
         return None
 
     def _rejection(self, before: int, action: int, refused: Refused) -> Rejection:

@@ -105,15 +105,18 @@ class RelaxedPlan(NamedTuple):
 class SearchProblem(Protocol[S]):
     """All that a planner may use.
 
-    Two more are looked for: ``relaxed_plan(state)``, a `RelaxedPlan` or None, and ``exhaustive``, False where an action
-    stands for several ways of which only one is tried, so that no search proves that a plan has the fewest actions.
+    Some more are looked for: ``relaxed_plan(state)``, a `RelaxedPlan` or None; ``exhaustive``, False where an action
+    stands for several ways of which only one is tried, so that no search proves that a plan has the fewest actions;
+    ``repeating``, a bitset of actions that may be done any number of times (none, where it lacks); ``remembered``, a
+    bitset of those of which no state says whether they were done (all); ``costs`` of the actions (each the same), and
+    ``task``, the `GroundTask` that heuristics ask.
 
     One of another kind than ground symbols that can be searched from its goal, too, has one method more: ``reversed()``
     gives the `SearchProblem` from there (`neurosym.language.reversal`).
 
     Attributes:
         actions: names of the N action primitives, in the order in which priors score them. Each can be used once in a
-            plan; the planner, not the state, remembers which were used.
+            plan, unless it is one of ``repeating``; the planner, not the state, remembers which were used.
         classes: one integer an action; swapping two actions of one class leaves the whole problem as it was.
         initial: the state to start from (hashable and small).
     """

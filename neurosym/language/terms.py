@@ -1,12 +1,13 @@
-"""Terms: types, variables, fluents, derived predicates, and the atoms and literals made of them."""
+"""Terms: types, variables, fluents, derived predicates, functions, and the atoms and literals made of them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from neurosym.errors import DefinitionError
+from neurosym.language.conditions import Condition, Equality, ObjectsOf
 from neurosym.language.search_problem import Verdict
 from neurosym.language.travel import reduced
 
@@ -40,15 +41,24 @@ class Type:
         return self.name
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Variable:
-    """A parameter of an action: a name with a type."""
+    """A parameter of an action: a name with a type. ``p != q`` is a condition: that they are two objects."""
 
     name: str
     type: Type
 
     def __post_init__(self) -> None:
         _check_name("variable", self.name)
+
+    def __eq__(self, other: object) -> Equality:  # type: ignore[override]
+        return Equality(self, other) if isinstance(other, Variable | str) else NotImplemented
+
+    def __ne__(self, other: object) -> Equality:  # type: ignore[override]
+        return Equality(self, other, False) if isinstance(other, Variable | str) else NotImplemented
+
+    def __hash__(self) -> int:
+        return hash((self.name, self.type))
 
     def __str__(self) -> str:
         return self.name
@@ -58,7 +68,7 @@ class Variable:
 Term = Variable | str
 
 
-class _Predicate:
+class Predicate:
     """What fluents and derived predicates share: a name, argument types, and being called."""
 
     __slots__ = ("name", "types")
@@ -100,7 +110,7 @@ class _Predicate:
         return f"{type(self).__name__}({self.name!r}, {', '.join(map(str, self.types))})"
 
 
-class Fluent(_Predicate):
+class Fluent(Predicate):
     """A fact that actions change: ``present = Fluent("present", part)``, then ``present("a")``, ``~present(p)``."""
 
     __slots__ = ("_hash",)
@@ -120,7 +130,7 @@ class Fluent(_Predicate):
         return Fluent, (self.name, *self.types)
 
 
-class Derived(_Predicate):
+class Derived(Predicate):
     """A predicate that is computed from the world and the state, not changed by effects.
 
     Its function takes the world (of an `Assembly` its `AssemblyGeometry`), the state and the names of the objects, and
@@ -175,25 +185,34 @@ def derived(*types: Type) -> Callable[[Callable[..., Verdict]], Derived]:
 
 
 @dataclass(frozen=True, slots=True)
-class Atom:
+class Atom(Condition):
     """A predicate with its arguments. ``~atom`` is its negation."""
 
-    predicate: _Predicate
+    predicate: Predicate
     args: tuple[Term, ...]
 
     def __invert__(self) -> Literal:
         return Literal(self, False)
 
-    def bind(self, binding: dict[str, str]) -> Atom:
+    def bind(self, binding: Mapping[str, str]) -> Atom:
         """The atom with its variables replaced by objects."""
-        return Atom(self.predicate, tuple(binding[a.name] if isinstance(a, Variable) else a for a in self.args))
+        return Atom(self.predicate, bound(self.args, binding))
+
+    def expanded(self, objects: ObjectsOf) -> Literal:
+        return Literal(self)
+
+    def literals(self) -> Iterator[Literal]:
+        return iter((Literal(self),))
+
+    def variables(self) -> Iterator[Variable]:
+        return (arg for arg in self.args if isinstance(arg, Variable))
 
     def __str__(self) -> str:
         return f"{self.predicate}({', '.join(map(str, self.args))})"
 
 
 @dataclass(frozen=True, slots=True)
-class Literal:
+class Literal(Condition):
     """An atom, or its negation."""
 
     atom: Atom
@@ -202,23 +221,36 @@ class Literal:
     def __invert__(self) -> Literal:
         return Literal(self.atom, not self.positive)
 
-    def bind(self, binding: dict[str, str]) -> Literal:
+    def bind(self, binding: Mapping[str, str]) -> Literal:
         return Literal(self.atom.bind(binding), self.positive)
+
+    def expanded(self, objects: ObjectsOf) -> Literal:
+        return self
+
+    def literals(self) -> Iterator[Literal]:
+        return iter((self,))
+
+    def variables(self) -> Iterator[Variable]:
+        return self.atom.variables()
 
     def __str__(self) -> str:
         return str(self.atom) if self.positive else f"not {self.atom}"
 
 
-Condition = Atom | Literal
+def bound(args: Sequence[Term], binding: Mapping[str, str]) -> tuple[Term, ...]:
+    """Arguments with variables replaced by objects, as far as they are bound."""
+    return tuple([binding.get(a.name, a) if isinstance(a, Variable) else a for a in args])
 
 
-def as_literal(condition: Any, place: str) -> Literal:
-    """A condition as a literal; anything else is refused, naming the place."""
-    if isinstance(condition, Literal):
-        return condition
-    if isinstance(condition, Atom):
-        return Literal(condition)
-    raise DefinitionError(f"In {place}: expected an atom such as present(p), or ~present(p); got {condition!r}.")
+def as_condition(given: Any, place: str) -> Condition:
+    """A condition, an atom as a literal; anything else is refused, naming the place."""
+    if isinstance(given, Atom):
+        return Literal(given)
+    if isinstance(given, Condition):
+        return given
+    raise DefinitionError(
+        f"In {place}: expected an atom such as present(p), or ~present(p), a | b, p != q; got {given!r}."
+    )
 
 
 def _check_name(kind: str, name: object) -> None:

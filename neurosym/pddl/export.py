@@ -95,7 +95,7 @@ class _Writer:
         self.given, self.compiled = problem, compiled
         self.names = Names()
         self.title = self.names.fresh(problem.domain.name)
-        self.types = {kind: self.names.fresh(kind.name) for kind in _types(problem)}
+        self.types = {kind: self.names.fresh(kind.name) for kind in types_of(problem)}
         self.objects = {name: self.names.fresh(name) for name in problem.type_of}
         self.predicates: dict[tuple[str, bool] | Mark, str] = {}
         self.typed: dict[str, tuple[Type, ...]] = {}
@@ -176,7 +176,7 @@ class _Writer:
         return f"({' '.join([name, *(self.objects[str(a)] for a in fact.atom.args)])})"
 
 
-def _types(problem: Problem) -> list[Type]:
+def types_of(problem: Problem) -> list[Type]:
     """All types, parents first."""
     types: dict[Type, None] = {}
 
@@ -185,9 +185,10 @@ def _types(problem: Problem) -> list[Type]:
             add(kind.parent)
         types[kind] = None
 
-    for kind in (*problem.objects, *(k for f in problem.domain.fluents for k in f.types)):
+    params = (p.type for action in problem.domain.actions for p in action.params)
+    for kind in (*problem.objects, *(k for f in problem.domain.fluents for k in f.types), *params):
         add(kind)
     return list(types)
 
 
-__all__ = ["PddlTask", "as_pddl", "write_pddl"]
+__all__ = ["PddlTask", "as_pddl", "types_of", "write_pddl"]

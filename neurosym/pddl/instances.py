@@ -29,6 +29,7 @@ class Instance:
         add, delete: its effects.
         ways: (in words, conditions): it can be done exactly when all conditions of one of them hold.
         marks: what it adds besides.
+        once: whether it can be used once only.
     """
 
     name: str
@@ -39,6 +40,7 @@ class Instance:
     delete: frozenset[Atom]
     ways: list[tuple[str, frozenset[Fact]]] = field(default_factory=list)
     marks: set[Mark] = field(default_factory=set)
+    once: bool = False
 
 
 def ground_instances(problem: Problem) -> list[Instance]:
@@ -59,6 +61,7 @@ def ground_instances(problem: Problem) -> list[Instance]:
                     [p for p in pre if isinstance(p.atom.predicate, Derived)],
                     frozenset(e.atom for e in eff if e.positive),
                     frozenset(e.atom for e in eff if not e.positive),
+                    once=action.once,
                 )
             )
     return found

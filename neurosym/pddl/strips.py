@@ -22,6 +22,12 @@ def strips(problem: Problem, *, seconds: float | None = None, refuted: Sequence[
     `seconds`: for the falls, or for the table of states. `refuted`: orders of action primitives in which something
     falls. Raises InputError: a predicate without a formula in a problem of too many states, or a derived goal.
     """
+    if any(a.conditions or a.conditional or a.cost is not None for a in problem.domain.actions):
+        raise InputError(
+            f"Expected a domain of literals only, to write {problem.name!r} as ground PDDL: its actions have formulas, "
+            "conditional effects or costs beside predicates that geometry answers. Without such predicates, or with "
+            "literals only, it can be written."
+        )
     instances = ground_instances(problem)
     formulas = [formulas_of(problem, i) for i in instances]
     asked = standing_asked(problem, instances, formulas)
@@ -58,9 +64,9 @@ def _compiled(
         pre: set[Fact] = {Mark("done", a) for a, b in before if b == i.name}
         if i.name in {a for a, _ in before}:
             add.add(Mark("done", i.name))
-        # Each action can be used once. Most see to it themselves: what they take away does not come back.
+        # What can be used once most often sees to it itself: what it takes away does not come back.
         spent = any((p.atom in i.delete - made) if p.positive else (p.atom in i.add - unmade) for p in i.needs)
-        if not spent:
+        if i.once and not spent:
             for facts in (pre, delete, init):
                 facts.add(Mark("unused", i.name))
         for how, way in i.ways:
@@ -75,10 +81,11 @@ def _compiled(
 
 
 def _goal(problem: Problem) -> frozenset[Fact]:
-    derived = [str(g) for g in problem.goal if isinstance(g.atom.predicate, Derived)]
+    derived = [*map(str, problem.goal_conditions)]
+    derived += [str(g) for g in problem.goal if isinstance(g.atom.predicate, Derived)]
     if derived:
         raise InputError(
-            f"Expected a goal of fluents to export {problem.name!r} as PDDL; {', '.join(derived)} is derived. "
+            f"Expected a goal of fluents to export {problem.name!r} as PDDL; {', '.join(derived)} is no fluent. "
             "State what should have changed instead."
         )
     return frozenset(problem.goal)

@@ -61,7 +61,7 @@ def ways_from_table(problem: Problem, seconds: float | None = None) -> Table:
                 no.setdefault(action, set()).add(state)
                 continue
             yes.setdefault(action, set()).add(state)
-            after = answer.state, used | 1 << action
+            after = answer.state, used | (1 << action & ground.remembered)
             if after not in seen:
                 seen.add(after)
                 waiting.append(after)

@@ -66,6 +66,8 @@ class PlanResult:
         first_guess_failed: whether the first complete order that was tried was refused somewhere;
             the paper's initial collapse. None when the search says nothing about it.
         fewest: whether it is proved that no plan has fewer actions; None where nobody asked.
+        total_cost: what the plan's actions cost in sum, where the domain says what they do; else None.
+        cheapest: whether it is proved that no plan costs less; None where nobody asked.
         why_not: why the search could not go on, for a problem that can explain it and has no plan; else None.
         side: from which side the search came to its end: "full", from the initial state; "empty", from the goal; "both"
             where they met.
@@ -89,6 +91,8 @@ class PlanResult:
     fewest: bool | None = None
     side: str = "full"
     best_suffix: tuple[str, ...] | None = None
+    total_cost: float | None = None
+    cheapest: bool | None = None
     n_actions: int | None = None
 
     def __post_init__(self) -> None:

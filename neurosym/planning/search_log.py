@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Collection, Hashable, Sequence
 from dataclasses import dataclass, field, replace
 from time import perf_counter
 from typing import Any, Generic, TypeVar
@@ -109,7 +109,7 @@ class SearchLog(Generic[S]):
             self._counts.timed_out = True
             return ()
 
-    def attempt(self, prefix: tuple[int, ...], state: S, action: int) -> Step[S] | Rejection:
+    def attempt(self, prefix: Collection[int], state: S, action: int) -> Step[S] | Rejection:
         """Ask the oracle for `action` after `prefix`, which led to `state`; counts one attempt.
 
         Where the time ends meanwhile, the answer is a rejection that promises nothing, and the budget is spent.
@@ -131,13 +131,13 @@ class SearchLog(Generic[S]):
         """Note a guess that failed without asking the oracle (not a candidate): an iteration, no attempt."""
         self._keep(prefix, action, Rejection(reason))
 
-    def _keep(self, prefix: tuple[int, ...], action: int, rejection: Rejection) -> None:
+    def _keep(self, prefix: Collection[int], action: int, rejection: Rejection) -> None:
         counts = self._counts
         counts.iterations += 1
         self.refused += 1
         self.all_proved = self.all_proved and rejection.proved
         if len(counts.rejections) < MAX_BLAME:
-            after, name = self.names(prefix), self._names[action]
+            after, name = self.names(tuple(prefix)), self._names[action]
             counts.rejections.append(replace(rejection, action=name, after=after, side=self.side))
 
     def names(self, actions: Sequence[int]) -> tuple[str, ...]:
@@ -151,10 +151,13 @@ class SearchLog(Generic[S]):
         scores: OrderScores | None = None,
         first_guess_failed: bool | None = None,
         fewest: bool | None = None,
+        cheapest: bool | None = None,
     ) -> PlanResult:
         """The result for a plan, given as indices of actions, forwards."""
         named, cost = Plan(self.names(plan), motions), None if scores is None else scores.plan_cost(plan)
-        rest = {"motions": named.motions, "cost": cost, "fewest": fewest}
+        costs: Sequence[float] | None = getattr(self.problem, "costs", None)
+        total = None if costs is None else sum(costs[action] for action in plan)
+        rest = {"motions": named.motions, "cost": cost, "fewest": fewest, "cheapest": cheapest, "total_cost": total}
         return self._result(Status.SOLVED, named, tuple(named), first_guess_failed, **rest)
 
     def failed(self, status: Status, *, first_guess_failed: bool | None = None) -> PlanResult:

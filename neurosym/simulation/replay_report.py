@@ -124,5 +124,5 @@ def reason_of(
 
 def in_hand(action: str, motion: StepMotion, what: str) -> StepReplay:
     """A step that is done where nothing else can fall."""
-    where, words = (motion.parts, motion.arrives), f"{joined(motion.parts)} {what}"
+    where, words = (motion.parts, motion.arrives), f"{joined(motion.parts)} {what}".strip()
     return StepReplay(action, *where, 0.0, 0.0, None, {}, (), True, words, motion.held, in_hand=True)

@@ -50,6 +50,8 @@ def first_part(staging: Staging, step: int) -> str | None:
 def describe(staging: Staging, step: int) -> str:
     """'remove L, along +z'; 'remove a with b, along +x'; 'take a off b, along -z'."""
     action, motion = staging.plan[step], staging.motions[step]
+    if not motion.parts:
+        return action
     around, part = set(company(staging, step)), first_part(staging, step)
     if part is None:
         return action
