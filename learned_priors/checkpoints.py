@@ -3,6 +3,7 @@
 A file is complete or absent: it is written beside its place and renamed.
 """
 
+import hashlib
 import json
 from collections.abc import Mapping
 from pathlib import Path
@@ -26,8 +27,8 @@ SCHEMA = 1
 def write_tensors(path: Path, tensors: Mapping[str, Tensor], header: Mapping[str, Any]) -> None:
     """Write tensors and a header; equal input gives equal bytes."""
     # One metadata key holding sorted JSON: safetensors keeps no order among several.
-    text = json.dumps({"schema": SCHEMA, **header}, sort_keys=True)
     plain = {name: tensor.detach().cpu().contiguous() for name, tensor in tensors.items()}
+    text = json.dumps({"schema": SCHEMA, **header, "digest": _digest(plain)}, sort_keys=True)
     data = safetensors.torch.save(plain, metadata={"neurosym": text})
     with written_whole(path) as file:
         file.write(data)
@@ -42,10 +43,24 @@ def read_tensors(path: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
             "It was written by another version: train again, or install that version."
         )
     data = read_bytes(path, MAX_BYTES, CheckpointError)
+    advice = "Make it again; a training starts over without it (resume=False; --no-resume on the command line)."
     try:
-        return safetensors.torch.load(data), header
+        tensors = safetensors.torch.load(data)
     except (SafetensorError, ValueError) as error:
-        raise CheckpointError(f"Expected {path} to be whole; it is damaged ({error}). Make it again.") from None
+        raise CheckpointError(f"Expected {path} to be whole; it is damaged ({error}). {advice}") from None
+    # Files of 0.1 have no digest.
+    if header.get("digest", (own := _digest(tensors))) != own:
+        raise CheckpointError(f"Expected {path} to be whole; its numbers are not those that were written. {advice}")
+    return tensors, header
+
+
+def _digest(tensors: Mapping[str, Tensor]) -> str:
+    """Of names, types, shapes and bytes."""
+    hashed = hashlib.sha256()
+    for name, tensor in sorted(tensors.items()):
+        hashed.update(f"{name} {tensor.dtype} {tuple(tensor.shape)}".encode())
+        hashed.update(tensor.reshape(-1).view(torch.uint8).numpy().tobytes())
+    return hashed.hexdigest()
 
 
 def save_network(path: Path, network: OrderNetwork, header: Mapping[str, Any]) -> None:

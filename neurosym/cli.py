@@ -3,6 +3,7 @@
 Exit codes are in `neurosym.commands.exit_codes`. Nothing heavy is imported before a command needs it.
 """
 
+import io
 import sys
 from collections.abc import Callable, Sequence
 from typing import Annotated
@@ -77,6 +78,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
     `arguments`: as typed after `neurosym`; None takes those of the process.
     """
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")  # names may have letters that the terminal has not
     try:
         app(args=None if arguments is None else list(arguments), prog_name="neurosym")
     except SystemExit as left:

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
+import subprocess
+import sys
 import zipfile
 from pathlib import Path
 
@@ -105,3 +108,39 @@ def test_a_box_beside_one_a_million_times_larger(tmp_path, second):
         lines += ["f " + " ".join(str(n + 8 * k) for n in face) for face in faces]
     (tmp_path / "two.obj").write_text("\n".join(lines))
     assert len(ns.Assembly.load(tmp_path / "two.obj")) == 2
+
+
+# -- at the command line ------------------------------------------------------------------------------------------
+
+
+def command(*words: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    line = [sys.executable, "-m", "neurosym.cli", *words]
+    return subprocess.run(line, capture_output=True, text=True, timeout=60, env=os.environ | environment)
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (("plan", "soma", "--problem", "3", "--out", ""), "name of a file"),
+        (("view", "soma", "--problem", "3", "--host", "nope.invalid"), "address of this machine"),
+        (("export", "{own}", "--graph", "{own}.dot", "--seconds", "5"), "--pddl"),
+        (("export", "{own}", "--pddl", "{own}.d", "--seconds", "nan"), "nan"),
+        (("render", "{own}", "--problem", "3", "--exploded", "{own}.png"), "is a path"),
+    ],
+)
+def test_what_would_be_ignored_or_lost_is_refused(words, says, tmp_path):
+    own = tmp_path / "own.json"
+    ns.Assembly.from_cells({"a": [(0, 0, 0)], "b": [(0, 0, 1)]}).save(own)
+    done = command(*(word.format(own=own) for word in words))
+    assert done.returncode == 33
+    assert says in " ".join((done.stdout + done.stderr).split())
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "cp1252", "latin-1"])
+def test_names_may_have_letters_that_the_terminal_has_not(encoding, tmp_path):
+    path = tmp_path / "中\U0001f600.json"
+    ns.Assembly.from_cells({"\u6728": [(0, 0, 0)], "\U0001f9f1": [(0, 0, 1)]}).save(path)
+    for words in (("inspect", str(path)), ("plan", str(path)), ("plan", str(path), "--json")):
+        done = command(*words, PYTHONIOENCODING=encoding)
+        assert done.returncode == 0, done.stderr

@@ -16,6 +16,7 @@ import pytest
 import torch
 
 import neurosym as ns
+from learned_priors.checkpoints import read_tensors, write_tensors
 from learned_priors.losses import cross_entropy, loss_of, squared_error, summed_by_class, targets_of
 from learned_priors.metrics import step_matches, whole_order_accuracy
 from learned_priors.network_prior import NetworkPrior
@@ -291,3 +292,14 @@ def test_what_a_prior_saves_is_told_and_one_that_harms_is_warned_of() -> None:
 def test_shares_of_orders_sum_to_one_and_know_what_never_comes_first() -> None:
     problem = ns.load_domain("assembly").problem(ns.Assembly.from_cells({"low": [(0, 0, 0)], "high": [(0, 0, 1)]}))
     assert ns.order_marginals(problem).tolist() == [[0.0, 1.0], [1.0, 0.0]]
+
+
+def test_a_flipped_bit_is_not_trained_on(tmp_path):
+    path = tmp_path / "state.safetensors"
+    write_tensors(path, {"a": torch.ones(3, 2), "n": torch.tensor(4)}, {"kind": "x"})
+    assert read_tensors(path)[0]["n"] == 4
+    data = bytearray(path.read_bytes())
+    data[-3] ^= 1
+    path.write_bytes(data)
+    with pytest.raises(ns.CheckpointError, match="--no-resume"):
+        read_tensors(path)

@@ -1183,7 +1183,12 @@ def test_nobody_can_ask_for_a_tunnel(viewer):
 
 @pytest.mark.parametrize(
     ("origin", "heard"),
-    [("http://evil.example", False), ("http://127.0.0.1.evil.example:8080", False), ("http://localhost:8080", True)],
+    [
+        ("http://evil.example", False),
+        ("http://127.0.0.1.evil.example:{port}", False),
+        ("http://localhost:{port}", True),
+        ("http://localhost:1", False),
+    ],
 )
 def test_pages_of_other_sites_are_not_heard(viewer, origin, heard):
     import viser
@@ -1191,6 +1196,7 @@ def test_pages_of_other_sites_are_not_heard(viewer, origin, heard):
     from websockets.sync.client import connect
 
     address = f"ws://127.0.0.1:{viewer.server.get_port()}"
+    origin = origin.format(port=viewer.server.get_port())
     settings = {"origin": origin, "subprotocols": [f"viser-v{viser.__version__}"], "compression": None}
     if heard:
         with connect(address, **settings) as socket:

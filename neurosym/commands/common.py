@@ -52,6 +52,15 @@ AssemblyPath = Annotated[
         metavar="PATH", help="A folder with one mesh a part, a scene, a robot, a puzzle, an assembly's JSON."
     ),
 ]
+
+
+def to_write(path: Path | None) -> Path | None:
+    """A file that is to be written, known to have a name before anything long begins."""
+    if path is not None and (not path.name or path.is_dir()):
+        raise typer.BadParameter(f"Expected the name of a file to write; got the folder {str(path)!r}.")
+    return path
+
+
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object to stdout, and nothing else.")]
 
 

@@ -17,6 +17,7 @@ from neurosym.commands.common import (
     print_json,
     problem_at,
     progress_bar,
+    to_write,
 )
 from neurosym.commands.spent import Spent
 from neurosym.errors import InputError
@@ -106,11 +107,15 @@ def export(
     *,
     pddl: Annotated[Path | None, typer.Option(metavar="DIR", help="Write domain.pddl and problem.pddl there.")] = None,
     graph: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="What blocks and touches what: .graphml, .dot or .json.")
+        Path | None,
+        typer.Option(metavar="FILE", callback=to_write, help="What blocks and touches what: .graphml, .dot or .json."),
     ] = None,
     files: FileOptions,
     removal: RemovalOptions,
-    seconds: Annotated[float, typer.Option(help="With --pddl: time to look for all that can fall.")] = SECONDS,
+    seconds: Annotated[
+        float | None,
+        typer.Option(help=f"With --pddl: time to look for all that can fall; default {SECONDS:g}."),
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Write what the geometry found as PDDL for classical planners, or as a graph.
@@ -120,6 +125,8 @@ def export(
     """
     if pddl is None and graph is None:
         raise InputError("Expected --pddl DIR or --graph FILE, or both; got neither.")
+    if seconds is not None and (pddl is None or not seconds >= 0):
+        raise InputError(f"Expected --seconds as a number, 0 or more, and with --pddl DIR; got {seconds:g}.")
     if pddl is not None and pddl.exists() and not pddl.is_dir():
         raise InputError(f"Expected --pddl to be a folder; {pddl} is a file.")
     problem = problem_at(path, files, removal.given())
@@ -137,7 +144,7 @@ def export(
         from neurosym.pddl.export import as_pddl
 
         with progress_bar(f"looking for what falls in {problem.name}", after=1.0):
-            task = as_pddl(problem, seconds=seconds)
+            task = as_pddl(problem, seconds=SECONDS if seconds is None else seconds)
         written += task.write(pddl)
         facts = {"sound": task.sound, "notes": list(task.notes), "actions": dict(task.actions)}
     if as_json:

@@ -22,6 +22,7 @@ from neurosym.commands.common import (
     problem_options,
     progress_bar,
     say,
+    to_write,
     write_json,
 )
 from neurosym.commands.plan_pddl import plan_pddl
@@ -78,7 +79,9 @@ def plan(
     ] = False,
     files: FileOptions,
     removal: RemovalOptions,
-    out: Annotated[Path | None, typer.Option(metavar="FILE", help="Keep it all as JSON.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="FILE", callback=to_write, help="Keep it all as JSON.")
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Plan one problem, and show each step with the refusals that led to it; or why there is no plan.

@@ -37,7 +37,10 @@ def render(
         Path | None, typer.Option(metavar="FILM", help="A film of the plan: .gif, .mp4 (extra `video`), or a folder.")
     ] = None,
     exploded: Annotated[
-        Path | None, typer.Option(metavar="FILE.png", help="The parts pulled apart, as the plan does: a picture.")
+        Path | None,
+        typer.Option(
+            metavar="FILE.png", callback=common.to_write, help="The parts pulled apart, as the plan does: a picture."
+        ),
     ] = None,
     spread: Annotated[float, typer.Option(min=0.0, help="How far apart in the exploded view.")] = 1.0,
     size: Annotated[
@@ -115,6 +118,8 @@ def _at_rest(what: str, number: int | None, files: common.FileOptions, options: 
     from neurosym.registry import domain_names, load_domain
 
     if what not in domain_names() and Path(what).exists():
+        if number is not None or options:
+            raise InputError(f"Expected --problem and options of a family with the name of one; {what} is a path.")
         world, name = common.load_assembly(Path(what), files), Path(what).resolve().name
     else:
         files.reading().refuse(f"{what!r} is a problem family")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from neurosym.commands.common import AsJson, console, print_json, write_json
+from neurosym.commands.common import AsJson, console, print_json, to_write, write_json
 from neurosym.commands.exit_codes import UNWELL
 from neurosym.support.words import joined, listed
 
@@ -31,7 +31,9 @@ def replay(
     threshold: Annotated[
         float | None, typer.Option(min=0.0, help="Displacement that counts as moved. Default: 0.2 of a typical body.")
     ] = None,
-    out: Annotated[Path | None, typer.Option(metavar="FILE", help="Keep the report as JSON.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="FILE", callback=to_write, help="Keep the report as JSON.")
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Do a plan in PyBullet, with gravity: did the rest stand still at each step, and by how much did it move?"""

@@ -52,9 +52,12 @@ def view(
     from neurosym.viewer.exhibit import Exhibit, Query
     from neurosym.viewer.export import check_name, export_page
     from neurosym.viewer.planning import Planning, check_query
+    from neurosym.viewer.server import check_host
     from neurosym.viewer.sources import open_source
 
-    if export is not None:
+    if export is None:
+        check_host(host)
+    else:
         check_name(export)
     options = {name: value for name, value in search.of_problem().items() if value is not None}
     options |= removal.given() | family_options(search.option)
