@@ -217,8 +217,7 @@ def check_overlaps(world: Assembly) -> None:
     bounds, sizes, shrink = world.body_bounds, world.bodies.box_sizes, world.touch
     near = overlapping_pairs(bounds[:, 0] + shrink, bounds[:, 1] - shrink, world.owners)
     for a, b in near[world.bodies.is_box[near].all(axis=1)]:
-        first, second = (collision.box_object(sizes[i] - shrink, world.X_WB[i]) for i in (a, b))
-        if collision.collide(first, second):
+        if collision.boxes_meet(sizes[a] - shrink, world.X_WB[a], sizes[b] - shrink, world.X_WB[b]):
             raise AssemblyError(
                 f"Pieces {world.names[world.owners[a]]!r} and {world.names[world.owners[b]]!r} overlap by more than "
                 f"{shrink:g}; expected pieces that at most touch. Move one of them."

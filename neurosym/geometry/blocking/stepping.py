@@ -51,14 +51,13 @@ def _meets(assembly: Assembly, a: int, b: int, direction: Array, apart: Array) -
         return False
     other = bodies.X_WB[b].copy()
     other[:3, 3] += apart
-    target = collision.box_object(size_b, other)
     pose = bodies.X_WB[a].copy()
     # Half the thinner of the two: no step can jump over the other box. No earlier than where the other begins.
     step = 0.5 * float(min(size_a.min(), size_b.min()))
     begin = max(0.0, float(second.min() - first.max()))
     for travelled in np.arange(begin, distance + step, step):
         pose[:3, 3] = bodies.X_WB[a][:3, 3] + travelled * direction
-        if collision.collide(collision.box_object(size_a - 2 * assembly.touch, pose), target):
+        if collision.boxes_meet(size_a - 2 * assembly.touch, pose, size_b, other):
             return True
     return False
 
@@ -73,5 +72,4 @@ def drops_onto(assembly: Assembly, body: int, other: int, X_WO: Array) -> bool:
         return False
     size[axis] += drop
     pose[2, 3] -= drop / 2
-    falling, target = collision.box_object(size, pose), collision.box_object(assembly.bodies.box_sizes[other], X_WO)
-    return collision.collide(falling, target)
+    return collision.boxes_meet(size, pose, assembly.bodies.box_sizes[other], X_WO)

@@ -6,6 +6,8 @@ What is avoided: `continuousCollide` (misses head-on boxes) and meshes at exact 
 
 from __future__ import annotations
 
+import threading
+
 import fcl
 import numpy as np
 
@@ -15,10 +17,39 @@ from neurosym.support.arrays import Array
 #: Corners of a face patch between two boxes: at most eight after clipping.
 MAX_CONTACTS = 8
 
+#: So many boxes of different sizes are kept.
+MAX_BOXES = 1 << 14
+
 
 def box_object(size: Array, X: Array) -> fcl.CollisionObject:
     """A box of full edge lengths `size` (3,) at pose `X` (4, 4)."""
     return fcl.CollisionObject(fcl.Box(*map(float, size)), fcl.Transform(X[:3, :3], X[:3, 3]))
+
+
+class _Boxes(threading.local):
+    """Two boxes of each size that was asked for, a thread: python-fcl never gives back all of an object's memory."""
+
+    def __init__(self) -> None:
+        self.kept: dict[tuple[float, ...], fcl.CollisionObject] = {}
+
+
+_BOXES = _Boxes()
+
+
+def boxes_meet(size_a: Array, X_a: Array, size_b: Array, X_b: Array) -> bool:
+    """Whether two boxes of full edge lengths (3,) at poses (4, 4) overlap."""
+    pair = []
+    for number, size, X in ((0.0, size_a, X_a), (1.0, size_b, X_b)):
+        key = (number, *map(float, size))
+        box = _BOXES.kept.get(key)
+        if box is None:
+            if len(_BOXES.kept) >= MAX_BOXES:
+                _BOXES.kept.clear()
+            box = _BOXES.kept[key] = box_object(size, X)
+        else:
+            place(box, X)
+        pair.append(box)
+    return collide(*pair)
 
 
 def mesh_object(shape: Shape, X: Array) -> fcl.CollisionObject:
