@@ -26,6 +26,7 @@ from neurosym.errors import CheckpointError, ContractError, InputError, UnknownN
 from neurosym.language.demonstrations import Demonstrations
 from neurosym.planning.order_scores import OrderScores
 from neurosym.planning.prior import Prior, RandomPrior, UniformPrior
+from neurosym.planning.weights_header import read_header
 from neurosym.registry import load_prior
 from neurosym.testing.priors import check_prior
 
@@ -320,12 +321,13 @@ def test_none_or_several_bundled_weights_are_named(folder: Path) -> None:
 
 def test_bundled_weights_are_small_and_say_what_they_are() -> None:
     for path in FOLDER.glob("*.safetensors"):
-        network, header = load_network(path)
+        header = read_header(path)
         assert path.name.startswith(f"{header['domain']}-")
         assert path.name.endswith(f"-{header['prior']}.safetensors")
         assert path.stat().st_size < 2**20
-        assert network.config.encoder == "small"
         assert {"seed", "epochs", "demonstrations", "seconds", "train_loss"} <= header["training"].keys()
+        if "actions" in header:  # a network that reads pictures
+            assert load_network(path)[0].config.encoder == "small"
 
 
 # Networks

@@ -43,8 +43,6 @@ class Timeline:
     """
 
     def __init__(self, staging: Staging, geometry: AssemblyGeometry | None = None) -> None:
-        if still := [action for action, motion in zip(staging.plan, staging.motions) if not motion.parts]:
-            raise InputError(f"Expected steps that move parts, to be shown on the page; {still[0]} moves none.")
         self.staging = staging
         known = geometry is not None and geometry.assembly is staging.assembly
         self.geometry = geometry if geometry and known else AssemblyGeometry(staging.assembly)
