@@ -17,6 +17,7 @@ import neurosym as ns
 from neurosym.cli import main
 from neurosym.errors import InputError, UnknownNameError
 from neurosym.geometry.stability.falls import find_falls
+from neurosym.geometry.stability.spring_stability import SpringStability
 from neurosym.language.problem import Problem
 from neurosym.pddl import gravity as pddl_gravity
 from neurosym.pddl.export import PddlTask, as_pddl, write_pddl
@@ -26,6 +27,13 @@ from neurosym.pipeline import count_orders
 pyperplan = pytest.importorskip("pyperplan.planner", reason="pyperplan is not installed: pip install '.[pddl]'")
 
 ASSEMBLY, SOMA = ns.load_domain("assembly"), ns.load_domain("soma")
+
+
+def assembled(given: ns.Assembly | int, **options: Any) -> ns.Problem:
+    """By limit analysis: of falls that only springs see no list is whole."""
+    return ASSEMBLY.problem(given, **{"stability": "limit", **options})
+
+
 logging.getLogger().setLevel(logging.WARNING)  # pyperplan logs each step to the root
 
 Cells = dict[str, list[tuple[int, int, int]]]
@@ -33,6 +41,9 @@ Cells = dict[str, list[tuple[int, int, int]]]
 part = ns.Type("part")
 present = ns.Fluent("present", part)
 p = part("p")
+
+#: What a file says that lists falls.
+GRAVITY = re.compile("Gravity: ")
 
 SIX_STACKS: Cells = {f"{level} {x}": [(2 * x, 0, z)] for x in range(6) for z, level in enumerate(("low", "high"))}
 SHUT: Cells = {
@@ -97,17 +108,17 @@ def random_heap(seed: int) -> ns.Assembly:
 
 def problems() -> dict[str, Problem]:
     predicates = ns.predicates
-    stool = ASSEMBLY.problem(0).world
-    found = {f"sample {k}, gravity": ASSEMBLY.problem(k) for k in range(6)}
-    found |= {f"sample {k}, none": ASSEMBLY.problem(k, gravity=False) for k in range(6)}
+    stool = assembled(0).world
+    found = {f"sample {k}, gravity": assembled(k) for k in range(6)}
+    found |= {f"sample {k}, none": assembled(k, gravity=False) for k in range(6)}
     found |= {f"soma, {rule}": SOMA.problem(3, collapse=rule) for rule in ("cubes", "strict", "rigid")}
-    found |= {f"heap {k}": ASSEMBLY.problem(random_heap(k)) for k in range(6)}
+    found |= {f"heap {k}": assembled(random_heap(k)) for k in range(6)}
     return found | {
         "half done": SOMA.problem(3, collapse="rigid", removed=["P"]),
-        "precedence": ASSEMBLY.problem(0, before=[("leg 2", "leg 0"), ("leg 0", "leg 1")]),
-        "held": ASSEMBLY.problem(0, held=1),
-        "fixed": ASSEMBLY.problem(0, fixed=["leg 0"]),
-        "stacks": ASSEMBLY.problem(ns.Assembly.from_cells(SIX_STACKS), directions="+z"),
+        "precedence": assembled(0, before=[("leg 2", "leg 0"), ("leg 0", "leg 1")]),
+        "held": assembled(0, held=1),
+        "fixed": assembled(0, fixed=["leg 0"]),
+        "stacks": assembled(ns.Assembly.from_cells(SIX_STACKS), directions="+z"),
         "own": own(stool, predicates.free(present), predicates.stable_without(present)),
         "own, supported": own(tower_of("a", "b", "c"), predicates.supported(present)),
         "own, silent": own(tower_of(*"abcdef"), not_in_the_middle),
@@ -117,13 +128,21 @@ def problems() -> dict[str, Problem]:
             predicates.stable_without(present),
         ),
         "two actions": two_actions(random_heap(108)),
-        "impossible": ASSEMBLY.problem(ns.Assembly.from_cells(SHUT)),
-        "impossible from the start": ASSEMBLY.problem(ns.Assembly.from_cells(SHUT), fixed=["box"]),
-        "impossible under gravity": ASSEMBLY.problem(4, before=[("lever", "left")]),
+        "impossible": assembled(ns.Assembly.from_cells(SHUT)),
+        "impossible from the start": assembled(ns.Assembly.from_cells(SHUT), fixed=["box"]),
+        "impossible under gravity": assembled(4, before=[("lever", "left")]),
     }
 
 
 PROBLEMS = problems()
+
+
+def told_apart(problem: Problem) -> int:
+    """How many orders, equal parts told apart, as in the files."""
+    counted = count_orders(problem)
+    found = counted.orders if counted.told_apart is None else counted.told_apart
+    assert found is not None
+    return found
 
 
 def read(task: PddlTask, folder: Path) -> Any:
@@ -169,8 +188,13 @@ def solved(task: PddlTask, folder: Path) -> tuple[str, ...] | None:
 def test_the_orders_of_the_files_are_those_of_neurosym(name: str, tmp_path: Path) -> None:
     problem = PROBLEMS[name]
     task = as_pddl(problem)
+    exact = told_apart(problem)
+    by_springs = isinstance(getattr(problem.geometry, "stability", None), SpringStability) and GRAVITY.search(task.domain)
+    if by_springs:  # then the file says that its plans are to be replayed
+        assert not task.sound
+        assert orders(task, tmp_path) >= exact
+        return
     assert task.sound
-    exact = count_orders(problem).orders
     assert orders(task, tmp_path) == exact
     assert exact or name.startswith(("impossible", "heap"))
     order = solved(task, tmp_path)
@@ -194,7 +218,7 @@ def fast_downward(task: PddlTask, folder: Path) -> tuple[str, ...] | None:
 
 
 @pytest.mark.parametrize(
-    "name", ["sample 0, gravity", "sample 2, gravity", "soma, rigid", "soma, cubes", "stacks", "own, silent"]
+    "name", ["sample 0, gravity", "sample 2, gravity", "heap 1", "soma, cubes", "stacks", "own, silent"]
 )
 def test_fast_downward_solves_the_same_files(name: str, tmp_path: Path) -> None:
     order = fast_downward(as_pddl(PROBLEMS[name]), tmp_path)
@@ -229,7 +253,7 @@ def test_helpers_take_over_where_disjunctions_multiply(tmp_path: Path, monkeypat
     monkeypatch.setattr(pddl_gravity, "MAX_OPERATORS", 1)
     task = as_pddl(problem)
     assert None in task.actions.values()
-    assert orders(task, tmp_path) == count_orders(problem).orders
+    assert orders(task, tmp_path) == told_apart(problem)
     order = solved(task, tmp_path)
     assert order is not None
     assert ns.validate(problem, order)
@@ -241,7 +265,7 @@ def test_without_time_valid_orders_are_kept_and_the_file_says_what_it_is_not(tmp
     assert not task.sound
     assert "replay" in task.domain
     found = orders(task, tmp_path)
-    exact = count_orders(problem).orders
+    exact = told_apart(problem)
     assert exact is not None
     assert found >= exact
 
@@ -273,7 +297,7 @@ def test_falls_are_true_and_none_is_missed() -> None:
 
 def test_what_cannot_be_written_is_refused_and_leaves_no_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(InputError, match="groups"):
-        write_pddl(ASSEMBLY.problem(0, groups=True, gravity=False), tmp_path / "none")
+        write_pddl(assembled(0, groups=True, gravity=False), tmp_path / "none")
     monkeypatch.setattr("neurosym.pddl.table.MAX_STATES", 3)
     with pytest.raises(InputError, match="not_in_the_middle"):
         write_pddl(PROBLEMS["own, silent"], tmp_path / "none")
@@ -290,7 +314,7 @@ def test_a_plan_file_is_read_back() -> None:
 
 def test_the_command_says_what_the_files_are(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     PROBLEMS["sample 0, gravity"].world.save(tmp_path / "stool.json")
-    command = ["export", str(tmp_path / "stool.json"), "--pddl", str(tmp_path / "out")]
+    command = ["export", str(tmp_path / "stool.json"), "--pddl", str(tmp_path / "out"), "--stability", "limit"]
     with pytest.raises(SystemExit, match="0"):
         main([*command, "--json"])
     said = json.loads(capsys.readouterr().out)
