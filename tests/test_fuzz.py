@@ -17,6 +17,7 @@ from polycubes import HALVES, Oracle, interlocked_halves
 
 import neurosym as ns
 from neurosym.errors import LONGEST
+from neurosym.geometry.step_motion import StepMotion
 from neurosym.plan_files.reading import read_search
 
 
@@ -76,6 +77,12 @@ def test_brackets_without_end(tmp_path):
     (tmp_path / "plan.json").write_text("[" * 200_000)
     with pytest.raises(ns.InputError, match="nested too deeply"):
         read_search(tmp_path / "plan.json")
+
+
+def test_directions_have_any_length():
+    for length in (5e-324, 1e-300, 1e-160, 1.0, 1e160, 1e308):
+        x, y, z = StepMotion.along((), (0.0, length, length)).direction or (1, 1, 1)
+        assert (x, round(y, 12), round(z, 12)) == (0.0, round(0.5**0.5, 12), round(0.5**0.5, 12))
 
 
 def test_messages_are_no_longer_than_one_reads():

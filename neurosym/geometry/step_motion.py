@@ -119,6 +119,7 @@ class StepMotion:
             vector = np.zeros(0)
         if vector.shape != (3,) or not np.isfinite(vector).all() or not vector.any():
             raise InputError(f"Expected a direction of three numbers, not all of them 0; got {direction!r}.")
+        vector = vector if 1e-150 < np.abs(vector).max() < 1e150 else vector / np.abs(vector).max()
         length = float(np.linalg.norm(vector))
         x, y, z = (vector if abs(length - 1) < 1e-9 else vector / length).tolist()
         return cls(tuple(parts), (x, y, z))
