@@ -187,7 +187,7 @@ def test_the_orders_of_the_files_are_those_of_neurosym(name: str, tmp_path: Path
     task = as_pddl(problem)
     exact = told_apart(problem)
     judge = getattr(problem.geometry, "stability", None)
-    if isinstance(judge, SpringStability) and "Gravity: " in task.domain:  # then the file says that its plans are to be replayed
+    if isinstance(judge, SpringStability) and "Gravity: " in task.domain:  # then plans are to be replayed
         assert not task.sound
         assert orders(task, tmp_path) >= exact
         return
