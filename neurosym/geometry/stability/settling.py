@@ -25,6 +25,9 @@ _ROUNDING = 1e-9
 _FLAT, _LINE_STEPS = 1e-2, 40
 #: Rounds at the most. Structures that stand after them, forces still wandering between equal states, stand.
 _ROUNDS = 100
+#: From this share of the threshold on a part is near falling: friction has to agree with Coulomb's law by this share of
+#: what is enough elsewhere.
+NEAR, NEARER = 0.25, 0.1
 #: So many rounds are remembered in mixing them.
 _MEMORY = 4
 
@@ -96,7 +99,9 @@ def _settle(springs: Springs, parts: Numbers, corners: Numbers, load: Array, sli
         falls = bool(share.max(initial=0.0) > numbers.falls)
         fell = fell + 1 if falls else 0
         limit = friction * forces[:, 0]
-        if fell >= numbers.patience or (not falls and done and system.agrees(forces, bound, limit)):
+        # Near the edge between the two, rest has to be nearer than elsewhere.
+        near = share.max(initial=0.0) > NEAR * numbers.falls
+        if fell >= numbers.patience or (not falls and done and system.agrees(forces, bound, limit, near)):
             break
         bound = np.minimum(bound, limit) if rounds == 0 else mixing.next(bound, limit)
     share = system.share(u)
@@ -157,8 +162,9 @@ class _System:
         """float64 (m,): the share of each part's weight that the ground carries."""
         return np.asarray(self.eps * np.abs(u).max(axis=1, initial=0.0))
 
-    def agrees(self, forces: Array, bound: Array, limit: Array) -> bool:
+    def agrees(self, forces: Array, bound: Array, limit: Array, near: bool) -> bool:
         """Whether friction is as Coulomb's law has it: no more than mu N, and as much where it slips."""
+        agreement = self.agreement * (NEARER if near else 1.0)
         rubbing = np.hypot(forces[:, 1], forces[:, 2])
         slips = rubbing >= bound * (1 - 1e-9)
         wrong = np.maximum(rubbing - limit, 0.0) + np.where(slips, np.maximum(limit - bound, 0.0), 0.0)
@@ -166,8 +172,8 @@ class _System:
         for place in (self.pa, self.pb):
             np.add.at(total, place, wrong)
             np.add.at(pressed, place, forces[:, 0])
-        scale = np.maximum(self.weights, self.agreement * pressed[:-1])
-        return bool((total[:-1] <= self.agreement * scale).all())
+        scale = np.maximum(self.weights, agreement * pressed[:-1])
+        return bool((total[:-1] <= agreement * scale).all())
 
     def newton(self, u: Array, d: Array, bound: Array, left: float, most: int) -> tuple[Array, Array, Array, bool]:
         """Displacements u (m, 6) and d (k, 3) of least energy, the forces (k, 3), and whether they are found."""
