@@ -19,12 +19,14 @@ from neurosym.geometry.paths.clearance import Clearance
 from neurosym.geometry.paths.grid import cells_of
 from neurosym.geometry.paths.path_check import check_path
 from neurosym.geometry.paths.path_search import Failure, extract
+from neurosym.geometry.paths.trees import Growth, connected
 from neurosym.geometry.paths.voxel_search import first_separation
 from neurosym.geometry.paths.voxel_separation import Separation
 from neurosym.geometry.rigid_motions import Interpolation, shifted
 from neurosym.geometry.shapes import Body, Box, Mesh, Part
 from neurosym.geometry.staging import staged
 from neurosym.geometry.step_motion import StepMotion, Track
+from neurosym.support.deadline import OutOfTime
 from neurosym.testing.burrs import RINGS
 
 STAY = np.eye(4)
@@ -500,3 +502,21 @@ def test_for_two_parts_the_lattice_and_the_exact_moves_agree(cells):
     assert isinstance(found, StepMotion) == isinstance(exact, Separation)
     if isinstance(found, Failure):
         assert found.proved
+
+
+@pytest.mark.parametrize("raised", [KeyboardInterrupt, OutOfTime, ValueError])
+def test_what_is_raised_under_ompl_is_not_lost(raised):
+    asked = 0
+
+    def free(at):
+        nonlocal asked
+        asked += 1
+        if asked > 20:
+            raise raised
+        return bool(np.abs(at[0]) > 0.01)
+
+    low, high = -np.ones(3), np.ones(3)
+    growth = Growth(0.1, 0.01, 0, lambda: asked > 10_000)
+    with pytest.raises(raised):
+        connected(low, high, low / 2, [high / 2], free, growth)
+    assert asked == 21

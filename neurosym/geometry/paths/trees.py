@@ -6,15 +6,18 @@ another's code, then follow from it, too). Trees end by a question of the caller
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from neurosym.errors import MissingDependencyError
 from neurosym.support.arrays import Array
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -54,8 +57,8 @@ def connected(
             allocated[k] = float(value)
         return allocated
 
-    space = base.RealVectorStateSpace(len(low))
-    setup = _setup(space, low, high, lambda state: is_free(point(state)), growth)
+    space, calls = base.RealVectorStateSpace(len(low)), _Calls()
+    setup = _setup(space, low, high, calls.kept(lambda state: bool(is_free(point(state))), False), growth)
     if len(goals) == 1:
         setup.setStartAndGoalStates(state(start), state(goals[0]))
     else:
@@ -67,7 +70,7 @@ def connected(
         if not goal.hasStates():
             return None
         setup.setGoal(goal)
-    return [point(s) for s in _solved(setup, geometric.RRTConnect, growth)] or None
+    return [point(s) for s in _solved(setup, geometric.RRTConnect, growth, calls)] or None
 
 
 def grown_out(
@@ -78,13 +81,15 @@ def grown_out(
     Their translations lie within bounds (3,).
     """
     base, geometric, _ = _ompl()
+    calls = _Calls()
+    distance = calls.kept(lambda state: left(_pose(state)), math.inf)
 
     class Out(base.GoalRegion):  # type: ignore[misc,name-defined]
         def distanceGoal(self, state: Any) -> float:
-            return left(_pose(state))
+            return distance(state)
 
     space = base.SE3StateSpace()
-    setup = _setup(space, low, high, lambda state: is_free(_pose(state)), growth)
+    setup = _setup(space, low, high, calls.kept(lambda state: bool(is_free(_pose(state))), False), growth)
     start = space.allocState()
     start.setXYZ(0.0, 0.0, 0.0)
     start.rotation().setIdentity()
@@ -92,7 +97,7 @@ def grown_out(
     goal = Out(setup.getSpaceInformation())
     goal.setThreshold(1e-9)
     setup.setGoal(goal)
-    return [_pose(state) for state in _solved(setup, geometric.RRT, growth)] or None
+    return [_pose(state) for state in _solved(setup, geometric.RRT, growth, calls)] or None
 
 
 def _setup(space: Any, low: Array, high: Array, is_free: Callable[[Any], bool], growth: Growth) -> Any:
@@ -107,20 +112,41 @@ def _setup(space: Any, low: Array, high: Array, is_free: Callable[[Any], bool], 
         bounds.setHigh(k, float(ends[1]))
     space.setBounds(bounds)
     setup = geometric.SimpleSetup(space)
-    setup.setStateValidityChecker(lambda state: bool(is_free(state)))  # OMPL takes a plain bool only
+    setup.setStateValidityChecker(is_free)  # a plain bool only
     share = growth.resolution / float(space.getMaximumExtent())
     setup.getSpaceInformation().setStateValidityCheckingResolution(share)
     return setup
 
 
-def _solved(setup: Any, planner: Callable[[Any], Any], growth: Growth) -> list[Any]:
+class _Calls:
+    """Functions that OMPL calls. What they raise, an interrupt too, may be lost in it: it is kept, and ends it."""
+
+    def __init__(self) -> None:
+        self.raised: BaseException | None = None
+
+    def kept(self, function: Callable[..., T], otherwise: T) -> Callable[..., T]:
+        """The function; its answer is `otherwise` from the first exception on."""
+
+        def called(*given: Any) -> T:
+            try:
+                return function(*given) if self.raised is None else otherwise
+            except BaseException as error:
+                self.raised = error
+                return otherwise
+
+        return called
+
+
+def _solved(setup: Any, planner: Callable[[Any], Any], growth: Growth, calls: _Calls) -> list[Any]:
     """States of an exact solution; none where there is none."""
     base, _, _ = _ompl()
 
     grower = planner(setup.getSpaceInformation())
     grower.setRange(growth.step)
     setup.setPlanner(grower)
-    setup.solve(base.PlannerTerminationCondition(lambda: bool(growth.spent())))
+    setup.solve(base.PlannerTerminationCondition(calls.kept(lambda: bool(growth.spent()), True)))
+    if calls.raised is not None:
+        raise calls.raised
     return list(setup.getSolutionPath().getStates()) if setup.haveExactSolutionPath() else []
 
 
