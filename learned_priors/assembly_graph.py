@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from neurosym.errors import InputError
 from neurosym.geometry.queries import AssemblyGeometry
-from neurosym.planning.outermost_first import outermost_layers
+from neurosym.planning.outermost_first import outermost_layers, parts_of_actions
 from neurosym.support.arrays import Array, Numbers
 
 if TYPE_CHECKING:
@@ -59,7 +58,7 @@ def read_graph(problem: Problem) -> AssemblyGraph:
 
     Raises InputError: the problem's world is no assembly, or its actions are not named after parts.
     """
-    moved, details = _moved_parts(problem), problem.details
+    moved, details = np.array(parts_of_actions(problem, "graph-sinkhorn")[1], dtype=np.int64), problem.details
     geometry = problem.geometry
     assert geometry is not None
     gravity, directions = bool(details.get("gravity", True)), details.get("directions")
@@ -122,19 +121,6 @@ def _peeled(geometry: AssemblyGeometry, directions: Directions, gravity: bool) -
             depths[tied], places[tied] = (depth + 1) / len(layers), (done + (len(tied) - 1) / 2) / last
             done += len(tied)
     return depths, places
-
-
-def _moved_parts(problem: Problem) -> Numbers:
-    world = problem.geometry
-    removes = {} if problem.simulation is None else problem.simulation.removes
-    names = [removes.get(action, action) for action in problem.actions]
-    strange = [n for n in names if world is None or n not in world.index]
-    if world is None or strange:
-        raise InputError(
-            "Expected a problem whose world is an Assembly and whose actions are named after its parts, for the prior "
-            f"graph-sinkhorn; {problem.name!r} has the action {strange[0]!r}."
-        )
-    return np.array([world.index[n] for n in names], dtype=np.int64)
 
 
 def _contacts(geometry: AssemblyGeometry, gravity: bool, flat: Array) -> tuple[Numbers, Array, tuple[Array, ...]]:

@@ -39,18 +39,10 @@ class OutermostFirst(Prior):
         return [self._scores(problem) for problem in problems]
 
     def _scores(self, problem: Problem) -> OrderScores:
-        world = problem.geometry
-        removes = {} if problem.simulation is None else problem.simulation.removes
-        parts = [removes.get(action, action) for action in problem.actions]
-        strange = [n for n in parts if world is None or n not in world.index]
-        if world is None or strange:
-            raise InputError(
-                "Expected a problem whose world is an Assembly and whose actions are named after its parts, for the "
-                f"prior outermost-first; {problem.name!r} has the action {strange[0]!r}."
-            )
+        world, parts = parts_of_actions(problem, "outermost-first")
         details = problem.details
         order = outermost_order(world, details.get("directions"), gravity=details.get("gravity", True))
-        rank = {name: place for place, name in enumerate(order)}
+        rank = {world.index[name]: place for place, name in enumerate(order)}
         place = np.argsort(np.argsort([rank[n] for n in parts]))
         steps = np.arange(len(parts))
         table = np.empty((len(parts), len(parts)))
@@ -91,3 +83,20 @@ def outermost_layers(
         layers.append([list(tied) for _, tied in ties])
         left &= ~sum(1 << i for i in layer)
     return layers
+
+
+def parts_of_actions(problem: Problem, prior: str) -> tuple[AssemblyGeometry, list[int]]:
+    """What answers questions about a problem's assembly, and the number of the part that each action takes out.
+
+    Raises InputError: its world is no `Assembly`, or its actions are not named after parts; `prior` is who asks.
+    """
+    world = problem.geometry
+    removes = {} if problem.simulation is None else problem.simulation.removes
+    names = [removes.get(action, action) for action in problem.actions]
+    strange = [n for n in names if world is None or n not in world.index]
+    if world is None or strange:
+        raise InputError(
+            "Expected a problem whose world is an Assembly and whose actions are named after its parts, for the prior "
+            f"{prior}; {problem.name!r} has the action {strange[0]!r}."
+        )
+    return world, [world.index[n] for n in names]

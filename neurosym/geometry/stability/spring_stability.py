@@ -26,7 +26,7 @@ from neurosym.geometry.stability.spring_verdicts import (
 from neurosym.geometry.stability.springs import DEFAULT_NUMBERS, DOWN, SpringNumbers, Springs, tilted
 from neurosym.geometry.stability.standing import Stability
 from neurosym.support.arrays import Array, Truths
-from neurosym.support.bitsets import bits
+from neurosym.support.bitsets import bits, members
 from neurosym.support.progress import tell
 
 
@@ -291,6 +291,4 @@ class SpringStability:
 
     def _mask(self, parts: int) -> Truths:
         """bool (n + 1,): a bitset; the last stands for the table."""
-        mask = np.zeros(len(self.masses) + 1, dtype=bool)
-        mask[bits(parts)] = True
-        return mask
+        return members(parts, len(self.masses) + 1)
